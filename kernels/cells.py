@@ -1,0 +1,249 @@
+"""Per-cell programs: one Python function becomes a vectorised CPU kernel and a CUDA kernel.
+
+A field is a 1-D array over a padded grid (`Layout`); a program is written for one cell::
+
+    @cells
+    def residual(i: int, j: int, k: int, b: Field, x: Field, pitch: int,
+                 # outputs
+                 r: Field): ...
+
+`i` is the column, `j` the row, `k` the index of the cell in every field of that layout, so the
+neighbours are k - 1, k + 1, k - pitch, k + pitch. `cells` wraps the program into
+
+* a CPU kernel in which a thread runs `SPAN` consecutive cells of one row: a countable loop over
+  consecutive addresses, which LLVM vectorises (a plain 2-D Warp kernel runs 20 times slower);
+* a CUDA kernel in which a thread runs one cell.
+
+The last span of a row may run past it, into cells of the same row that `Layout` keeps free; what
+it leaves in ghost cells is overwritten when they are filled. All CPU kernels share one Warp module
+and all CUDA kernels another: a module costs four seconds to compile before its first kernel, and a
+device compiles only its own.
+
+A number that lives on the device, and so may change between replays of a captured graph, is
+annotated `Uniform`; a table with one entry a row is annotated `RowReal` or `RowIndex`. The kernel reads
+them once a span and the program sees a plain number.
+"""
+
+import inspect
+import linecache
+import os
+import types
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import warp as wp
+
+_PRECISIONS = {"float32": wp.float32, "float64": wp.float64}
+_precision = os.environ.get("WFLUID_PRECISION", "float32")
+if _precision not in _PRECISIONS:
+    raise ValueError(f"WFLUID_PRECISION={_precision!r}: expected one of {', '.join(_PRECISIONS)}")
+
+Real = _PRECISIONS[_precision]
+"""The scalar of every field; float32 unless WFLUID_PRECISION=float64 is set for the process."""
+
+Field = wp.array[Real]
+"""A 1-D device array of `Real` over a `Layout`."""
+
+Indices = wp.array[wp.int32]
+"""A 1-D device array of indices."""
+
+
+class Uniform:
+    """Annotation of a number in device memory: pass an array of one element, receive a `Real`."""
+
+
+class RowReal:
+    """Annotation of a table over the rows: pass a `Field` of them, receive row j's `Real`."""
+
+
+class RowIndex:
+    """Annotation of a table over the rows: pass `Indices`, receive row j's index."""
+
+
+_HOISTED = {Uniform: (Real, Field, "0"), RowReal: (Real, Field, "j"), RowIndex: (wp.int32, Indices, "j")}
+"""Annotation: what the program receives, what the kernel takes, which entry it reads."""
+
+
+HALO = 2
+"""Ghost cells on each side of a field: what a cubic stencil at a wall reaches."""
+
+SPAN = 64
+"""Cells a CPU thread runs. Long enough to pay for the loop's entry, short enough that padding a row
+to a multiple of it stays cheap."""
+
+CPU_FLAGS = (
+    "-march=native -mprefer-vector-width=512 -ffp-contract=fast"
+    " -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
+)
+"""Programs are inlined whole into their span loop, or the loop does not vectorise."""
+
+
+def whole_spans(n: int) -> int:
+    """N rounded up to whole spans: the room a row, or a table over columns, takes."""
+    return -(-n // SPAN) * SPAN
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the cell in row j, column i of an nx by ny grid lies in a 1-D field."""
+
+    nx: int
+    ny: int
+
+    @property
+    def pitch(self) -> int:
+        """Elements from one row to the next: whole spans and a halo on both sides."""
+        return whole_spans(self.nx) + 2 * HALO
+
+    @property
+    def size(self) -> int:
+        """Elements of a field. One row more than the halo, for stencils that read ahead of it."""
+        return (self.ny + 2 * HALO + 1) * self.pitch
+
+    @property
+    def first(self) -> int:
+        """Index of the cell in row 0, column 0."""
+        return HALO * self.pitch + HALO
+
+
+class Program:
+    """A per-cell (or per-line) function with its kernel for each kind of device."""
+
+    def __init__(self, func: wp.Function, kernels: dict[str, wp.Kernel], span: int):
+        self.func = func
+        self.kernels = kernels
+        self.span = span
+
+    def launch(
+        self,
+        layout: Layout,
+        device: wp.Device,
+        inputs: Sequence,
+        outputs: Sequence,
+        rows: tuple[int, int] | None = None,
+        layers: int = 1,
+    ) -> None:
+        """Run the program on every cell of `layout`, or of its rows `rows[0]` to `rows[1]` - 1.
+
+        A layered program runs so for n = 0 … layers - 1.
+        """
+        row, end = rows or (0, layout.ny)
+        spans = layout.nx if device.is_cuda else -(-layout.nx // self.span)
+        where = [row, end - row, spans, layout.first, layout.pitch]
+        wp.launch(
+            self.kernels["cuda" if device.is_cuda else "cpu"],
+            dim=layers * (end - row) * spans,
+            inputs=[*inputs],
+            outputs=[*outputs, *where],
+            device=device,
+        )
+
+
+class Lines:
+    """A function of a line number t (a row, a column, a force) with its kernels."""
+
+    def __init__(self, kernels: dict[str, wp.Kernel]):
+        self.kernels = kernels
+
+    def launch(self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence) -> None:
+        """Run the function for t = 0 … lines - 1."""
+        kernel = self.kernels["cuda" if device.is_cuda else "cpu"]
+        wp.launch(kernel, dim=lines, inputs=[*inputs], outputs=[*outputs], device=device)
+
+
+_CELLS = """def {name}({signature}, row_: int, rows_: int, spans_: int, first_: int, pitch_: int):
+    t = wp.tid()
+    line = t // spans_
+    n = line // rows_
+    i = (t - line * spans_) * SPAN
+    j = row_ + line - n * rows_
+    k = first_ + j * pitch_ + i
+{hoisted}
+    for c in range(SPAN):
+        func({layer}i + c, j, k + c, {arguments})
+"""
+
+_LINES = """def {name}({signature}):
+    t = wp.tid()
+{hoisted}
+    func(t, {arguments})
+"""
+
+
+def cells(program: Callable, span: int = SPAN) -> Program:
+    """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell."""
+    layered = next(iter(inspect.signature(program).parameters)) == "n"
+    template = _CELLS.replace("{layer}", "n, " if layered else "")
+    func, kernels = _kernels(program, skip=3 + layered, template=template, spans={"cpu": span, "cuda": 1})
+    return Program(func, kernels, span)
+
+
+def lines(program: Callable) -> Lines:
+    """Make a function of (t, …) that runs once a line, one a thread on every device."""
+    return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1})[1])
+
+
+def _kernels(program, skip, template, spans):
+    parameters = list(inspect.signature(program, eval_str=True).parameters.values())[skip:]
+    hoisted = {p.name: _HOISTED[p.annotation] for p in parameters if p.annotation in _HOISTED}
+    program.__annotations__.update({name: received for name, (received, _, _) in hoisted.items()})
+    func = wp.func(program)
+    source_of = {
+        "signature": ", ".join(f"{p.name}: annotation_{p.name}" for p in parameters),
+        "arguments": ", ".join(f"{p.name}_0" if p.name in hoisted else p.name for p in parameters),
+        "hoisted": "\n".join(f"    {name}_0 = {name}[{entry}]" for name, (_, _, entry) in hoisted.items()),
+    }
+    kernels = {}
+    for kind, span in spans.items():
+        name = f"{program.__module__.rpartition('.')[2]}_{program.__name__}_{span}"
+        source = template.format(name=name, **source_of)
+        file = f"<{kind} {program.__module__}.{program.__name__} {span}>"
+        linecache.cache[file] = (len(source), None, source.splitlines(True), file)  # Warp reads the source
+        scope = {"wp": wp, "func": func, "SPAN": wp.constant(span)}
+        for p in parameters:
+            scope[f"annotation_{p.name}"] = hoisted[p.name][1] if p.name in hoisted else p.annotation
+        exec(compile(source, file, "exec"), scope)
+        kernel: types.FunctionType = scope[name]
+        kernel.__module__ = program.__module__
+        kernels[kind] = wp.kernel(kernel, module=module_of(kind))
+    return func, kernels
+
+
+def module_of(kind: str) -> wp.Module:
+    """The Warp module that holds every kernel for "cpu" or "cuda"."""
+    module = wp.get_module(f"wfluid.{kind}")
+    module.options.update(enable_backward=False, cpu_compiler_flags=CPU_FLAGS)
+    return module
+
+
+@wp.func_native("__builtin_assume(k >= 4); return k;")
+def inside(k: int) -> int:
+    """Promise the compiler that k is a cell, never among the first elements of its field.
+
+    Warp wraps negative indices; the test for it stops the vectoriser. Apply it to the base of every
+    row touched; neighbours in the row follow as k - 1, k + 1.
+    """
+    ...
+
+
+@wp.func_native("__builtin_assume(i >= 0); return i;")
+def entry(i: int) -> int:
+    """Promise the compiler that i, an entry of a table, is not negative."""
+    ...
+
+
+_BITS = {"float32": "wp::int32", "float64": "wp::int64"}[_precision]
+
+
+@wp.func_native(
+    "__builtin_assume(k >= 0);"
+    f"const {_BITS} bits = ((const {_BITS}*)f.data)[k];"
+    f"wp::{_precision} value; memcpy(&value, &bits, sizeof(value)); return value;"
+)
+def gather(f: Field, k: int) -> Real:
+    """f[k] at an address the compiler cannot foresee.
+
+    Reading through an integer lvalue proves that the read does not alias a store to a `Field`, so a
+    loop of gathers vectorises. Never use it on an array that the same kernel writes.
+    """
+    ...

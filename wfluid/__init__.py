@@ -1,0 +1,54 @@
+"""wfluid: animate, warp and morph pictures by treating them as a fluid.
+
+    from wfluid import Fluid, GaussianForce, Oscillator, animate, read_picture, write_animation
+    picture = read_picture("raccoon.jpg")
+    nose = GaussianForce((0.61, 0.44), (1.5, 1.0), 0.06, Oscillator(period=1.0))
+    write_animation("nose.gif", animate(picture, Fluid(viscosity=0.001), [nose], duration=2), fps=24)
+
+One unit of length is the picture's longer side, one unit of time a second; x points right, y down.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "Animation": "animation",
+    "Frame": "animation",
+    "Timeline": "animation",
+    "animate": "animation",
+    "CoordinateMap": "coordinate_map",
+    "MapQuality": "coordinate_map",
+    "Fluid": "fluid",
+    "Arbitrary": "forces",
+    "Constant": "forces",
+    "GaussianForce": "forces",
+    "Instantaneous": "forces",
+    "Oscillator": "forces",
+    "Grid": "grid",
+    "LookUp": "look_up",
+    "write_animation": "output",
+    "Picture": "picture",
+    "PictureError": "picture",
+    "read_picture": "picture",
+    "write_picture": "picture",
+    "SolveReport": "solver",
+    "Solver": "solver",
+    "State": "state",
+    "Wall": "walls",
+    "Walls": "walls",
+}
+__version__ = "0.1.0"
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: `import wfluid` loads neither Warp nor OpenImageIO."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'wfluid' has no attribute {name!r}")
+    return getattr(import_module(f"wfluid.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,72 @@
+"""The map of one frame: for every place, where in the source picture its colour comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from wfluid.grid import Grid
+from wfluid.kernels import measure
+from wfluid.kernels.cells import Real
+from wfluid.state import State
+from wfluid.walls import Walls
+
+
+@dataclass(frozen=True)
+class CoordinateMap:
+    """A backward map (`source_of`) on the cells' centres of a grid."""
+
+    grid: Grid
+    """The grid it was computed on."""
+    walls: Walls
+    """The walls it was computed between: how it continues beyond the edges."""
+    displacement: np.ndarray
+    """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
+
+    @classmethod
+    def of_state(cls, state: State, walls: Walls) -> CoordinateMap:
+        """A copy of a state's map."""
+        return cls(state.grid, walls, np.stack(state.displacement, axis=2))
+
+    @property
+    def source_of(self) -> np.ndarray:
+        """Place in the source seen at each centre [longer side], (ny, nx, 2), x then y."""
+        grid = self.grid
+        x = (np.arange(grid.nx) + 0.5) * grid.hx
+        y = (np.arange(grid.ny) + 0.5) * grid.hy
+        return self.displacement + np.stack(np.meshgrid(x, y), axis=2)
+
+
+@dataclass(frozen=True)
+class MapQuality:
+    """What a map does to the picture: folds, areas, distances."""
+
+    jacobian_min: float
+    """Least det of the map's Jacobian over the cells; 0 or less is a fold."""
+    jacobian_max: float
+    """Greatest det of the map's Jacobian."""
+    displacement_max: float
+    """Longest displacement [longer side]."""
+    displacement_mean: float
+    """Mean length of the displacement [longer side]."""
+    outside_fraction: float
+    """Part of the cells whose source lies beyond a closed edge."""
+
+
+def measure_map(state: State, walls: Walls) -> MapQuality:
+    """Judge a state's map, on its device."""
+    layout, device, grid = state.layout, state.u.device, state.grid
+    least, greatest, outside = (wp.empty(layout.ny, dtype=Real, device=device) for _ in range(3))
+    closed = [int(not periodic) for periodic in walls.periodic]
+    inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
+    measure.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
+    length = np.hypot(*state.displacement)
+    return MapQuality(
+        float(least.numpy().min()),
+        float(greatest.numpy().max()),
+        float(length.max()),
+        float(length.mean()),
+        float(outside.numpy().sum()) / (grid.nx * grid.ny),
+    )

@@ -1,0 +1,110 @@
+"""The report of a run: one JSON object with settings, times and the extremes over all frames."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wfluid.animation import Animation, Frame
+from wfluid.picture import PictureError, whole_file
+
+
+@dataclass
+class Report:
+    """Collects what the frames of an animation say of themselves."""
+
+    animation: Animation
+    """What is run."""
+    frames: int = 0
+    """Frames seen."""
+    extremes: dict[str, float] = field(
+        default_factory=lambda: {
+            "divergence_max": 0.0,
+            "jacobian_min": math.inf,
+            "jacobian_max": -math.inf,
+            "displacement_max_px": 0.0,
+            "displacement_mean_px": 0.0,
+            "outside_fraction": 0.0,
+        }
+    )
+    """Over all frames; the mean displacement is that of the frame where it is largest."""
+    residual_max: float = 0.0
+    """Largest relative residual of a projection."""
+
+    def add(self, frame: Frame) -> None:
+        """Take a frame's figures."""
+        side = max(self.animation.picture.width, self.animation.picture.height)
+        seen, quality = self.extremes, frame.quality
+        self.frames += 1
+        seen["jacobian_min"] = min(seen["jacobian_min"], quality.jacobian_min)
+        seen["jacobian_max"] = max(seen["jacobian_max"], quality.jacobian_max)
+        for name, value in (
+            ("displacement_max_px", quality.displacement_max * side),
+            ("displacement_mean_px", quality.displacement_mean * side),
+            ("outside_fraction", quality.outside_fraction),
+            ("divergence_max", frame.solve.divergence if frame.solve else 0.0),
+        ):
+            seen[name] = max(seen[name], value)
+        if frame.solve:
+            self.residual_max = max(self.residual_max, frame.solve.pressure.relative)
+
+    def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
+        """The report; `seconds` adds the times that the animation does not know."""
+        import numpy
+        import OpenImageIO
+        import warp
+
+        from wfluid import __version__
+
+        animation, fluid = self.animation, self.animation.fluid
+        times = animation.seconds
+        return {
+            "picture": [animation.picture.width, animation.picture.height],
+            "grid": [animation.grid.nx, animation.grid.ny],
+            "frames": self.frames,
+            "fps": animation.timeline.fps,
+            "steps": max(self.frames - 1, 0) * animation.timeline.steps_per_frame,
+            "settings": {
+                "viscosity": fluid.viscosity,
+                "walls": [fluid.walls.x.value, fluid.walls.y.value],
+                "scheme": fluid.scheme,
+                "solver": fluid.solver,
+                "substeps": animation.timeline.steps_per_frame,
+                "filter": animation.filter,
+                "edge": animation.edge,
+            },
+            "seconds": {
+                "compile": times.compile,
+                "simulate": times.simulate,
+                "lookup": times.lookup,
+                **seconds,
+            },
+            **self.extremes,
+            "pressure_residual_max": self.residual_max,
+            "device": str(animation.solver.device.name),
+            "versions": {
+                "wfluid": __version__,
+                "warp": warp.__version__,
+                "OpenImageIO": OpenImageIO.__version__,
+                "numpy": numpy.__version__,
+            },
+        }
+
+
+def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
+    """Write a report as JSON, whole or not at all.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    path = Path(path)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error

@@ -1,0 +1,266 @@
+"""One step of the fluid: forces, advection, diffusion, projection (Bonilla & Velho, section II).
+
+    v1 = v0 + dt f                           forces
+    v2(x) = v1(foot of x)                    advection
+    (1 - dt mu Lap) v3 = v2                  diffusion, implicit Euler
+    v4 = v3 - grad q,  Lap q = div v3        projection
+
+The foot is traced through v0, which is free of divergence, and carries the map along: v1 is not, and
+would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1; the two differ by
+O(dt^2) a step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from wfluid.device import load_kernels
+from wfluid.fluid import Fluid
+from wfluid.forces import GaussianForce
+from wfluid.grid import Grid
+from wfluid.kernels import advection, projection, relaxation, transport
+from wfluid.kernels import forces as force_kernels
+from wfluid.kernels.cells import Layout, Real
+from wfluid.multigrid import LinearSystem, Points, Residual, norm
+from wfluid.state import State, field, from_numpy
+from wfluid.walls import Ghosts
+
+STEP_LIMIT = 10.0
+"""Longest step the solver is tested with [s]."""
+
+_PER_FORCE = 5
+"""Numbers of a force on the device: center, radius and impulse."""
+
+
+@dataclass(frozen=True)
+class SolveReport:
+    """What the last step's solves left."""
+
+    pressure: Residual
+    """Of the projection: the divergence left, as iterations and norms."""
+    diffusion: Residual
+    """Of the diffusion of u, relative to the change it made."""
+    divergence: float
+    """Largest |div v| left [1/s]."""
+
+
+class Solver:
+    """Steps fluids of one grid and one kind on one device.
+
+    Building one loads the kernels. Each pair of states stepped between is captured as one graph and
+    replayed from then on; the time, the step and the forces' numbers are read from device memory.
+    """
+
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+        self.grid, self.fluid, self.device = grid, fluid, device
+        self.compile_seconds = load_kernels(device)
+        self.layout = Layout(grid.nx, grid.ny)
+        walls, size, shape = fluid.walls, (grid.width, grid.height), (grid.nx, grid.ny)
+        self._u_ghosts = Ghosts(self.layout, walls.u_rules(), device)
+        self._v_ghosts = Ghosts(self.layout, walls.v_rules(), device)
+        self._d_x_ghosts = Ghosts(self.layout, walls.moved_x_rules(), device)
+        self._d_y_ghosts = Ghosts(self.layout, walls.moved_y_rules(), device)
+        self._pressure = LinearSystem(*shape, Points(size, walls.centre_rules()), device)
+        self._pressure.set_coefficients(0.0, 1.0)
+        self._diffusion = (
+            LinearSystem(*shape, Points(size, walls.u_rules(), (True, False)), device),
+            LinearSystem(*shape, Points(size, walls.v_rules(), (False, True)), device),
+        )
+        self._foot_x, self._foot_y, self._q, self._minus_div = (field(self.layout, device) for _ in range(4))
+        self._pushed, self._carried, self._diffused, self._change, self._answer = (
+            (field(self.layout, device), field(self.layout, device)) for _ in range(5)
+        )
+        self._inverse_h = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
+        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._controls: dict[int, _Controls] = {}
+        self._graphs: dict[tuple, tuple[wp.Graph, State, State]] = {}
+
+    def rest(self) -> State:
+        """A new state: a still fluid under an untouched picture."""
+        return State.at_rest(self.grid, self.device)
+
+    def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
+        """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        for values, f, ghosts in ((u, state.u, self._u_ghosts), (v, state.v, self._v_ghosts)):
+            from_numpy(values, f, self.layout)
+            ghosts.fill(f)
+
+    def step(
+        self, state_in: State, state_out: State, forces: Sequence[GaussianForce], t: float, dt: float
+    ) -> None:
+        """Advance `state_in` at time t by dt into `state_out`, another state.
+
+        Raises:
+            ValueError: dt negative, not finite or above 10 s, or the two states are one.
+        """
+        if not (math.isfinite(dt) and 0 <= dt <= STEP_LIMIT):
+            raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
+        if state_in is state_out:
+            raise ValueError("a step cannot write the state it reads")
+        diffuses = self.fluid.viscosity * dt > 0
+        controls = self._controls.setdefault(len(forces), _Controls(len(forces), self.device))
+        controls.set(self.grid, forces, t, dt)
+        if diffuses:
+            for system in self._diffusion:
+                system.set_coefficients(1.0, dt * self.fluid.viscosity)
+        key = (id(state_in), id(state_out), len(forces), diffuses)
+        if key not in self._graphs:
+            self._pressure.prepare(self.fluid.pressure_cycles)
+            for system in self._diffusion:
+                system.prepare(self.fluid.diffusion_cycles)
+            with wp.ScopedCapture(device=self.device) as capture:
+                self._launch(state_in, state_out, controls, diffuses)
+            self._graphs[key] = (capture.graph, state_in, state_out)
+        wp.capture_launch(self._graphs[key][0])
+
+    def report(self) -> SolveReport:
+        """Measure what the last step's solves left: true residuals and the divergence."""
+        pressure = self._pressure.measure(self._minus_div, self._q, self._iterations("pressure"))
+        self._pressure.levels[0].residual(self._minus_div, self._q, self._pressure.left)
+        divergence = norm(self._pressure.left, self.layout)[1]
+        if self.fluid.viscosity > 0:
+            diffusion = self._diffusion[0].measure(
+                self._change[0], self._answer[0], self._iterations("diffusion")
+            )
+        else:
+            diffusion = Residual(0, 0.0, 0.0)
+        return SolveReport(pressure, diffusion, divergence)
+
+    def project(self, state_in: State, state_out: State) -> None:
+        """The divergence-free part of `state_in`'s velocity into `state_out`; its map is untouched."""
+        self._project((state_in.u, state_in.v), state_out)
+
+    def _iterations(self, solve: str) -> int:
+        multigrid = self.fluid.solver == "multigrid"
+        return getattr(self.fluid, f"{solve}_cycles") if multigrid else self.fluid.sweeps
+
+    def _launch(self, state_in: State, state_out: State, controls: _Controls, diffuses: bool) -> None:
+        self._trace(state_in, controls)
+        v1 = self._push(state_in, controls)
+        self._carry_map(state_in, state_out)
+        v2 = self._advect(v1)
+        v3 = self._diffuse(v2) if diffuses else v2
+        self._project(v3, state_out)
+
+    def _where(self) -> list[int]:
+        periodic_x, periodic_y = self.fluid.walls.periodic
+        return [self.grid.nx, self.grid.ny, int(periodic_x), int(periodic_y), self.layout.pitch]
+
+    def _trace(self, state: State, controls: _Controls) -> None:
+        trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
+        inputs = [state.u, state.v, controls.dt_hx, controls.dt_hy, *self._where()]
+        trace.launch(self.layout, self.device, inputs, [self._foot_x, self._foot_y])
+        self._d_x_ghosts.fill(self._foot_x)
+        self._d_y_ghosts.fill(self._foot_y)
+
+    def _push(self, state: State, controls: _Controls) -> tuple[wp.array, wp.array]:
+        if not controls.count:
+            return state.u, state.v
+        u, v = self._pushed
+        wp.copy(u, state.u)
+        wp.copy(v, state.v)
+        controls.push(self.grid, self.fluid, self.layout, u, v)
+        self._u_ghosts.fill(u)
+        self._v_ghosts.fill(v)
+        return u, v
+
+    def _carry_map(self, state_in: State, state_out: State) -> None:
+        paper = self.fluid.scheme == "paper"
+        carry = transport.carry_map_bilinear if paper else transport.carry_map_cubic
+        inputs = [state_in.d_x, state_in.d_y, self._foot_x, self._foot_y, *self._where()]
+        carry.launch(self.layout, self.device, inputs, [state_out.d_x, state_out.d_y])
+        self._d_x_ghosts.fill(state_out.d_x)
+        self._d_y_ghosts.fill(state_out.d_y)
+
+    def _advect(self, velocity: tuple[wp.array, wp.array]) -> tuple[wp.array, wp.array]:
+        paper = self.fluid.scheme == "paper"
+        advect = advection.advect_face_bilinear if paper else advection.advect_face_cubic
+        for f, out, before in zip(velocity, self._carried, (1, self.layout.pitch), strict=True):
+            inputs = [f, self._foot_x, self._foot_y, before, *self._where()]
+            advect.launch(self.layout, self.device, inputs, [out])
+        self._u_ghosts.fill(self._carried[0])
+        self._v_ghosts.fill(self._carried[1])
+        return self._carried
+
+    def _diffuse(self, velocity: tuple[wp.array, wp.array]) -> tuple[wp.array, wp.array]:
+        """V3 = v2 + the solution of A change = v2 - A v2.
+
+        Solving for the change keeps uniform motion exact and makes the solver's residual one of the
+        change, not of the velocity; with a symmetric solver M the adjoint is 1 + (1 - A) M.
+        """
+        for system, f, change, answer, out in zip(
+            self._diffusion, velocity, self._change, self._answer, self._diffused, strict=True
+        ):
+            top = system.levels[0]
+            top.residual(f, f, change)
+            self._solve(system, change, answer, self.fluid.diffusion_cycles)
+            relaxation.add_scaled.launch(self.layout, self.device, [f, answer, self._one], [out])
+            top.ghosts.fill(out)
+        return self._diffused
+
+    def _project(self, velocity: tuple[wp.array, wp.array], state_out: State) -> None:
+        x, y = self._inverse_h[0:1], self._inverse_h[1:2]
+        pitch = self.layout.pitch
+        inputs = [*velocity, x, y, pitch]
+        projection.minus_divergence.launch(self.layout, self.device, inputs, [self._minus_div])
+        self._solve(self._pressure, self._minus_div, self._q, self.fluid.pressure_cycles)
+        inputs = [*velocity, self._q, x, y, pitch]
+        projection.subtract_gradient.launch(self.layout, self.device, inputs, [state_out.u, state_out.v])
+        self._u_ghosts.fill(state_out.u)
+        self._v_ghosts.fill(state_out.v)
+
+    def _solve(self, system: LinearSystem, b: wp.array, x: wp.array, cycles: int) -> None:
+        if self.fluid.solver == "multigrid":
+            system.multigrid(b, x, cycles)
+        else:
+            system.jacobi(b, x, self.fluid.sweeps)
+
+
+class _Controls:
+    """What changes from step to step, in one device array: dt / h and the forces' numbers."""
+
+    def __init__(self, count: int, device: wp.Device):
+        self.count = count
+        self.device = device
+        self.numbers = wp.zeros(2 + _PER_FORCE * max(count, 1), dtype=Real, device=device)
+        self.dt_hx, self.dt_hy = self.numbers[0:1], self.numbers[1:2]
+        self.center_x, self.center_y, self.radius, self.impulse_x, self.impulse_y = (
+            self.numbers[2 + n * count : 2 + (n + 1) * count] if count else None for n in range(_PER_FORCE)
+        )
+        self._profiles: tuple[wp.array, ...] | None = None
+
+    def set(self, grid: Grid, forces: Sequence[GaussianForce], t: float, dt: float) -> None:
+        """Put the step from t to t + dt on the device."""
+        impulses = [force.envelope.integral(t, t + dt) for force in forces]
+        numbers = [dt / grid.hx, dt / grid.hy]
+        numbers += [force.center[0] for force in forces]
+        numbers += [force.center[1] for force in forces]
+        numbers += [force.radius for force in forces]
+        numbers += [force.vector[0] * impulse for force, impulse in zip(forces, impulses, strict=True)]
+        numbers += [force.vector[1] * impulse for force, impulse in zip(forces, impulses, strict=True)]
+        self.numbers[: len(numbers)].assign(np.array(numbers))
+
+    def push(self, grid: Grid, fluid: Fluid, layout: Layout, u: wp.array, v: wp.array) -> None:
+        """Add the forces' impulses to u and v, in place."""
+        if self._profiles is None:
+            self._profiles = tuple(
+                wp.zeros(self.count * n, dtype=Real, device=self.device)
+                for n in (grid.nx, grid.nx, grid.ny, grid.ny)
+            )
+        periodic_x, periodic_y = fluid.walls.periodic
+        axes = (
+            (self.center_x, grid.nx, 0.0, grid.hx, grid.width * periodic_x),
+            (self.center_x, grid.nx, 0.5, grid.hx, grid.width * periodic_x),
+            (self.center_y, grid.ny, 0.5, grid.hy, grid.height * periodic_y),
+            (self.center_y, grid.ny, 0.0, grid.hy, grid.height * periodic_y),
+        )
+        for (center, points, start, h, period), profile in zip(axes, self._profiles, strict=True):
+            inputs = [center, self.radius, points, start, h, period]
+            force_kernels.profile.launch(self.count * points, self.device, inputs, [profile])
+        inputs = [self.impulse_x, self.impulse_y, *self._profiles, grid.nx, grid.ny]
+        force_kernels.push.launch(layout, self.device, inputs, [u, v], layers=self.count)
