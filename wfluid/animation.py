@@ -158,16 +158,21 @@ class Animation:
         self.seconds.compile = solver.compile_seconds
         return solver
 
+    def _source(self) -> Picture:
+        """What is looked up in: shrunk first when the frames are smaller, so that they do not alias."""
+        width, height = self.width or self.picture.width, self.height or self.picture.height
+        return self.picture.resized(min(width, self.picture.width), min(height, self.picture.height))
+
     def frames(self) -> Iterator[Frame]:
         """Run the animation from rest, one frame at a time."""
         solver, timeline, clock = self.solver, self.timeline, time.perf_counter
         look_up = LookUp(
-            self.picture,
+            self._source(),
             self.grid,
             self.fluid.walls,
             solver.device,
-            width=self.width,
-            height=self.height,
+            width=self.width or self.picture.width,
+            height=self.height or self.picture.height,
             filter=self.filter,
             edge=self.edge,
         )

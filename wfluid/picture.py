@@ -61,6 +61,19 @@ class Picture:
         """Pixels along y."""
         return self.pixels.shape[0]
 
+    def resized(self, width: int, height: int) -> Picture:
+        """The picture at another size, filtered so that shrinking does not alias."""
+        import OpenImageIO as oiio
+
+        if (width, height) == (self.width, self.height):
+            return self
+        source = oiio.ImageBuf(np.ascontiguousarray(self.pixels))
+        roi = oiio.ROI(0, width, 0, height, 0, 1, 0, self.pixels.shape[2])
+        result = oiio.ImageBufAlgo.resize(source, roi=roi)
+        if result.has_error:
+            raise PictureError(f"resizing to {width} x {height} failed ({_first_line(result.geterror())})")
+        return self.with_pixels(result.get_pixels(oiio.FLOAT).reshape(height, width, -1))
+
     def with_pixels(self, pixels: np.ndarray) -> Picture:
         """The same kind of picture with other pixels."""
         return replace(self, pixels=pixels)

@@ -131,8 +131,22 @@ class Solver:
             diffusion = Residual(0, 0.0, 0.0)
         return SolveReport(pressure, diffusion, divergence)
 
+    def carry(self, state_in: State, state_out: State, dt: float) -> None:
+        """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
+        controls = self._controls.setdefault(0, _Controls(0, self.device))
+        controls.set(self.grid, (), 0.0, dt)
+        self._trace(state_in, controls)
+        self._carry_map(state_in, state_out)
+
+    def diffuse(self, state_in: State, state_out: State, dt: float) -> None:
+        """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
+        for system in self._diffusion:
+            system.set_coefficients(1.0, dt * self.fluid.viscosity)
+        for diffused, out in zip(self._diffuse((state_in.u, state_in.v)), state_out.arrays, strict=False):
+            wp.copy(out, diffused)
+
     def project(self, state_in: State, state_out: State) -> None:
-        """The divergence-free part of `state_in`'s velocity into `state_out`; its map is untouched."""
+        """Only project the velocity; the map of `state_out` is untouched."""
         self._project((state_in.u, state_in.v), state_out)
 
     def _iterations(self, solve: str) -> int:
