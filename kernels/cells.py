@@ -72,10 +72,12 @@ SPAN = 64
 to a multiple of it stays cheap."""
 
 CPU_FLAGS = (
-    "-march=native -mprefer-vector-width=512 -ffp-contract=fast"
+    "-march=native -mprefer-vector-width=512 -ffp-contract=off"
     " -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
-"""Programs are inlined whole into their span loop, or the loop does not vectorise."""
+"""Programs are inlined whole into their span loop, or the loop does not vectorise. Products are not
+fused into sums: it gains nothing here (the loops wait for memory), and without it every vector width,
+hence every CPU, computes the same bits."""
 
 
 def whole_spans(n: int) -> int:
@@ -212,7 +214,7 @@ def _kernels(program, skip, template, spans):
 def module_of(kind: str) -> wp.Module:
     """The Warp module that holds every kernel for "cpu" or "cuda"."""
     module = wp.get_module(f"wfluid.{kind}")
-    module.options.update(enable_backward=False, cpu_compiler_flags=CPU_FLAGS)
+    module.options.update(enable_backward=False, fuse_fp=kind == "cuda", cpu_compiler_flags=CPU_FLAGS)
     return module
 
 

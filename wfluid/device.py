@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import warp as wp
@@ -21,7 +25,8 @@ def open_device(name: str | None = None) -> wp.Device:
         DeviceError: no such device here; the message lists what there is.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
-    wp.init()
+    with _quiet_stderr():
+        wp.init()
     try:
         return wp.get_device(name or "cpu")
     except (ValueError, RuntimeError) as error:
@@ -45,6 +50,20 @@ def load_kernels(device: wp.Device) -> float:
     if module_of(_kind(device)).load(device, _threads(device)) is None:
         raise RuntimeError(f"the kernels could not be built for {device.alias}")
     return time.perf_counter() - start
+
+
+@contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    """Drop what native code writes to stderr: Warp warns of a missing CUDA driver on every CPU."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _kind(device: wp.Device) -> str:

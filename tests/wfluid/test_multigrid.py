@@ -1,0 +1,158 @@
+"""The linear solves: against sparse direct solves, their symmetry, their convergence."""
+
+import numpy as np
+import pytest
+from conftest import laplacian_2d, sparse_laplacian
+
+from wfluid.grid import Grid
+from wfluid.multigrid import LinearSystem, Points, chebyshev_factors
+from wfluid.state import field, from_numpy, to_numpy
+from wfluid.walls import Rule
+
+SIZES = ((16, 16), (31, 24), (37, 29), (53, 8), (6, 61))
+KINDS = {
+    "pressure": (0.0, 1.0, (Rule.EVEN, Rule.EVEN), (False, False), ("even", "even")),
+    "pressure periodic": (0.0, 1.0, (Rule.PERIODIC, Rule.EVEN), (False, False), ("periodic", "even")),
+    "u free-slip": (1.0, 0.02, (Rule.FACE, Rule.EVEN), (True, False), ("face", "even")),
+    "v no-slip": (1.0, 0.3, (Rule.ODD, Rule.FACE), (False, True), ("odd", "face")),
+    "u periodic": (1.0, 5.0, (Rule.PERIODIC, Rule.ODD), (True, False), ("periodic", "odd")),
+}
+
+
+def system_for(kind, nx, ny, device):
+    """The system, its grid and which of the stored points are unknowns."""
+    shift, scale, rules, on_faces, _ = KINDS[kind]
+    longer = max(nx, ny)
+    grid = Grid(nx, ny, nx / longer, ny / longer)
+    system = LinearSystem(nx, ny, Points((grid.width, grid.height), rules, on_faces), device)
+    system.set_coefficients(shift, scale)
+    cut = (slice(int(rules[1] is Rule.FACE), ny), slice(int(rules[0] is Rule.FACE), nx))
+    return system, grid, cut
+
+
+def right_hand_side(kind, grid, cut, seed=0):
+    b = np.zeros((grid.ny, grid.nx))
+    b[cut] = np.random.default_rng(seed).standard_normal(b[cut].shape)
+    if KINDS[kind][0] == 0:
+        b -= b.mean()
+    return b
+
+
+def solve(system, b, cycles=None, sweeps=None):
+    layout = system.levels[0].layout
+    rhs, x = field(layout, system.device), field(layout, system.device)
+    from_numpy(b, rhs, layout)
+    if sweeps:
+        system.jacobi(rhs, x, sweeps)
+    else:
+        system.multigrid(rhs, x, cycles)
+    return to_numpy(x, layout), system.measure(rhs, x, sweeps or cycles)
+
+
+@pytest.mark.float64
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("kind", KINDS)
+def test_multigrid_equals_a_sparse_direct_solve(device, kind, size):
+    """On even, odd and prime sizes and both extremes of aspect; the matrix is SciPy's."""
+    import scipy.sparse as sparse
+    from scipy.sparse.linalg import spsolve
+
+    shift, scale, *_, axes = KINDS[kind]
+    system, grid, cut = system_for(kind, *size, device)
+    b = right_hand_side(kind, grid, cut)
+    x, residual = solve(system, b, cycles=16)
+    matrix = shift * sparse.eye_array(b[cut].size) - scale * laplacian_2d(grid, *axes)
+    if shift == 0:  # the constant is free: fix the mean
+        matrix = matrix + np.ones((1, 1)) * sparse.coo_array(([1.0], ([0], [0])), shape=matrix.shape)
+    exact = spsolve(sparse.csc_array(matrix), b[cut].ravel())
+    got = x[cut].ravel()
+    if shift == 0:
+        exact, got = exact - exact.mean(), got - got.mean()
+    assert residual.relative < 1e-11
+    np.testing.assert_allclose(got, exact, atol=1e-9 * np.abs(exact).max())
+
+
+@pytest.mark.float64
+@pytest.mark.parametrize("cycles", [1, 2, 3])
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("kind", KINDS)
+def test_fixed_cycles_are_a_symmetric_operator(device, kind, size, cycles):
+    """<p, M q> = <M p, q> to rounding, converged or not: the adjoint of a solve is the same solve."""
+    system, grid, cut = system_for(kind, *size, device)
+    p, q = (right_hand_side(kind, grid, cut, seed) for seed in (1, 2))
+    left, right = np.sum(p * solve(system, q, cycles)[0]), np.sum(q * solve(system, p, cycles)[0])
+    size = np.linalg.norm(p) * np.linalg.norm(solve(system, q, cycles)[0])
+    assert abs(left - right) < 1e-13 * size, f"{left} against {right}"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_three_cycles_leave_less_than_a_thousandth(device, kind):
+    """And say so: the residual reported is the one of the answer."""
+    system, grid, cut = system_for(kind, 61, 48, device)
+    b = right_hand_side(kind, grid, cut)
+    assert solve(system, b, cycles=3)[1].relative < 1e-3
+    assert solve(system, b, cycles=1)[1].relative > 1e-3
+
+
+def test_jacobi_is_the_fixed_point_iteration(device):
+    """Sweeps of x <- x + (b - A x) / diag, written again with SciPy's matrix."""
+    system, grid, cut = system_for("u free-slip", 19, 14, device)
+    b = right_hand_side("u free-slip", grid, cut)
+    got, residual = solve(system, b, sweeps=7)
+    matrix = np.eye(b[cut].size) - 0.02 * laplacian_2d(grid, "face", "even").toarray()
+    diagonal = 1 + 2 * 0.02 * (1 / grid.hx**2 + 1 / grid.hy**2)  # the interior's, ghosts do the rest
+    x = np.zeros(b[cut].size)
+    for _ in range(7):
+        x += (b[cut].ravel() - matrix @ x) / diagonal
+    np.testing.assert_allclose(got[cut].ravel(), x, atol=2e-6)
+    assert residual.iterations == 7
+
+
+@pytest.mark.float64
+@pytest.mark.parametrize("size", [(24, 24), (31, 18), (13, 37)], ids=str)
+def test_face_coefficients_equal_a_sparse_direct_solve(device, size):
+    """-div (beta grad x) = b with smooth beta from 1 down to 0.2, assembled with SciPy."""
+    import scipy.sparse as sparse
+    from scipy.sparse.linalg import spsolve
+
+    nx, ny = size
+    longer = max(size)
+    grid = Grid(nx, ny, nx / longer, ny / longer)
+    system = LinearSystem(nx, ny, Points((grid.width, grid.height), (Rule.EVEN, Rule.EVEN)), device)
+    bump = lambda x, y: 1 - 0.8 * np.exp(-((x - 0.4) ** 2 + (y - 0.3) ** 2) / 0.03)  # noqa: E731
+    x_face, y_face = np.arange(nx + 1) * grid.hx, np.arange(ny + 1)[:, None] * grid.hy
+    x_centre, y_centre = (np.arange(nx) + 0.5) * grid.hx, (np.arange(ny)[:, None] + 0.5) * grid.hy
+    beta_x, beta_y = bump(x_face, y_centre), bump(x_centre, y_face)
+    system.set_beta(beta_x, beta_y)
+    b = right_hand_side("pressure", grid, (slice(None), slice(None)))
+    got, residual = solve(system, b, cycles=20)
+
+    def gradient(n, h):
+        return sparse.diags_array([-np.ones(n - 1), np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n)) / h
+
+    g_x = sparse.kron(sparse.eye_array(ny), gradient(nx, grid.hx))
+    g_y = sparse.kron(gradient(ny, grid.hy), sparse.eye_array(nx))
+    matrix = g_x.T @ sparse.diags_array(beta_x[:, 1:-1].ravel()) @ g_x
+    matrix = matrix + g_y.T @ sparse.diags_array(beta_y[1:-1].ravel()) @ g_y
+    matrix = sparse.lil_array(matrix)
+    matrix[0, 0] += 1.0
+    exact = spsolve(sparse.csc_array(matrix), b.ravel())
+    assert residual.relative < 1e-9
+    np.testing.assert_allclose(got.ravel() - got.mean(), exact - exact.mean(), atol=1e-7 * np.abs(exact).max())
+
+
+def test_the_oracle_itself_has_the_right_null_space():
+    """Neumann and periodic second differences kill constants, the others do not."""
+    for kind, kills in (("even", True), ("periodic", True), ("odd", False), ("face", False)):
+        matrix = sparse_laplacian(7, 0.3, kind)
+        assert (np.abs(matrix @ np.ones(matrix.shape[0])).max() < 1e-12) == kills
+
+
+def test_chebyshev_factors_damp_the_interval_evenly():
+    """Prod (1 - w x) is at most 1 / T_n((b + a) / (b - a)) on [a, b]."""
+    low, high = 0.45, 2.0
+    x = np.linspace(low, high, 201)
+    for count in (1, 2, 3, 4):
+        left = np.prod([1 - w * x for w in chebyshev_factors(low, high, count)], axis=0)
+        best = 1 / np.cosh(count * np.arccosh((high + low) / (high - low)))
+        assert np.abs(left).max() == pytest.approx(best, rel=1e-9)
