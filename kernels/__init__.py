@@ -3,6 +3,26 @@
 Importing the package registers every program, so that each device's module is built once and whole.
 """
 
-from wfluid.kernels import advection, forces, ghosts, lookup, measure, projection, relaxation, transfer, transport
+from wfluid.kernels import (
+    advection,
+    forces,
+    ghosts,
+    lookup,
+    measure,
+    projection,
+    relaxation,
+    transfer,
+    transport,
+)
 
-__all__ = ["advection", "forces", "ghosts", "lookup", "measure", "projection", "relaxation", "transfer", "transport"]
+__all__ = [
+    "advection",
+    "forces",
+    "ghosts",
+    "lookup",
+    "measure",
+    "projection",
+    "relaxation",
+    "transfer",
+    "transport",
+]

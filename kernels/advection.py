@@ -16,7 +16,6 @@ Fluids, 1999, section 3.2; R. Bridson, Fluid Simulation for Computer Graphics, 2
 """
 
 import warp as wp
-
 from wfluid.kernels.cells import Field, Real, Uniform, cells, gather, inside
 
 

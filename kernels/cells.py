@@ -172,20 +172,25 @@ _LINES = """def {name}({signature}):
 """
 
 
-def cells(program: Callable, span: int = SPAN) -> Program:
-    """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell."""
+def cells(program: Callable, span: int = SPAN, module: str = "wfluid") -> Program:
+    """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell.
+
+    Programs outside this package name a module of their own, so that this one is not built again.
+    """
     layered = next(iter(inspect.signature(program).parameters)) == "n"
     template = _CELLS.replace("{layer}", "n, " if layered else "")
-    func, kernels = _kernels(program, skip=3 + layered, template=template, spans={"cpu": span, "cuda": 1})
+    func, kernels = _kernels(
+        program, skip=3 + layered, template=template, spans={"cpu": span, "cuda": 1}, module=module
+    )
     return Program(func, kernels, span)
 
 
 def lines(program: Callable) -> Lines:
     """Make a function of (t, …) that runs once a line, one a thread on every device."""
-    return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1})[1])
+    return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1}, module="wfluid")[1])
 
 
-def _kernels(program, skip, template, spans):
+def _kernels(program, skip, template, spans, module):
     parameters = list(inspect.signature(program, eval_str=True).parameters.values())[skip:]
     hoisted = {p.name: _HOISTED[p.annotation] for p in parameters if p.annotation in _HOISTED}
     program.__annotations__.update({name: received for name, (received, _, _) in hoisted.items()})
@@ -207,13 +212,13 @@ def _kernels(program, skip, template, spans):
         exec(compile(source, file, "exec"), scope)
         kernel: types.FunctionType = scope[name]
         kernel.__module__ = program.__module__
-        kernels[kind] = wp.kernel(kernel, module=module_of(kind))
+        kernels[kind] = wp.kernel(kernel, module=module_of(kind, module))
     return func, kernels
 
 
-def module_of(kind: str) -> wp.Module:
+def module_of(kind: str, name: str = "wfluid") -> wp.Module:
     """The Warp module that holds every kernel for "cpu" or "cuda"."""
-    module = wp.get_module(f"wfluid.{kind}")
+    module = wp.get_module(f"{name}.{kind}")
     module.options.update(enable_backward=False, fuse_fp=kind == "cuda", cpu_compiler_flags=CPU_FLAGS)
     return module
 

@@ -10,7 +10,6 @@ exact for every envelope and any dt). Beyond `CUT` radii g is below rounding and
 """
 
 import warp as wp
-
 from wfluid.kernels.cells import Field, Real, cells, entry, gather, inside, lines
 
 CUT = wp.constant(Real({"float32": 6.0, "float64": 9.0}[Real.__name__]))

@@ -14,7 +14,6 @@ Written in place: only ghosts and faces on a wall are written, only other cells 
 from wfluid.kernels.cells import Field, Indices, lines
 
 
-
 @lines
 def fill(
     t: int,

@@ -7,7 +7,6 @@ pixel, row by row without padding: four channels are read, weighted and added at
 """
 
 import warp as wp
-
 from wfluid.kernels.advection import inner_weight, outer_weight
 from wfluid.kernels.cells import Field, Indices, Real, RowIndex, RowReal, cells, entry, gather, inside
 

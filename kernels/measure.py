@@ -1,7 +1,6 @@
 """What a frame is judged by: sums and extremes, one row a line; the host combines the rows."""
 
 import warp as wp
-
 from wfluid.kernels.cells import Field, Real, lines
 
 

@@ -16,7 +16,6 @@ Loan, Matrix Computations, 4th ed., 11.2.8; Briggs, Henson & McCormick, A Multig
 """
 
 import warp as wp
-
 from wfluid.kernels.cells import Field, Real, Uniform, cells, inside, lines
 
 
@@ -160,7 +159,7 @@ def residual_beta(
     # outputs
     r: Field,
 ):
-    """r = b + div (beta grad x)."""  # noqa: D403 (a symbol)
+    """r = b + div (beta grad x)."""
     k = inside(k)
     r[k] = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)
 

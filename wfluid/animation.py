@@ -16,7 +16,7 @@ from wfluid.forces import GaussianForce
 from wfluid.grid import LEAST_CELLS, Grid
 from wfluid.look_up import LookUp
 from wfluid.picture import Picture
-from wfluid.solver import SolveReport, Solver
+from wfluid.solver import Solver, SolveReport
 
 STEPS_PER_SECOND = 96
 """Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""

@@ -48,7 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog="wfluid", description="Animate, warp and morph pictures by treating them as a fluid.")
+    parser = Parser(
+        prog="wfluid", description="Animate, warp and morph pictures by treating them as a fluid."
+    )
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=Parser)
     animate = verbs.add_parser(
         "animate",
@@ -196,7 +198,7 @@ def _write_frames(animation, output, report, quiet: bool) -> float:
         raise
 
 
-class _progress:  # noqa: N801 (reads as a verb: with _progress(…) as advance)
+class _progress:
     """A bar on stderr with frame rate and remaining time; silent when quiet or not on a terminal."""
 
     def __init__(self, frames: int, quiet: bool):

@@ -75,7 +75,9 @@ class Arbitrary:
         if (self.function is None) == (not self.times):
             raise ValueError("Arbitrary: expected either a function or samples")
         if len(self.times) != len(self.values) or len(self.times) == 1:
-            raise ValueError(f"Arbitrary: {len(self.times)} times and {len(self.values)} values: need equal, 2 or more")
+            raise ValueError(
+                f"Arbitrary: {len(self.times)} times and {len(self.values)} values: need equal, 2 or more"
+            )
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise ValueError("Arbitrary: times do not increase")
         for value in (*self.times, *self.values):
@@ -171,7 +173,9 @@ class GaussianForce:
                 _finite(f"GaussianForce.{name}", value)
             object.__setattr__(self, name, values)
         if math.hypot(*self.vector) > FORCE_LIMIT:
-            raise ValueError(f"force of {math.hypot(*self.vector):g}: the limit is {FORCE_LIMIT:g} longer sides/s^2")
+            raise ValueError(
+                f"force of {math.hypot(*self.vector):g}: the limit is {FORCE_LIMIT:g} longer sides/s^2"
+            )
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise ValueError(f"GaussianForce.radius {self.radius}: expected a positive number")
 

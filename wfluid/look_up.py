@@ -87,7 +87,9 @@ class LookUp:
         self._ghosts = [Ghosts(self._strip, axis, device) for axis in rules]
         self._stretched = [field(self._strip, device) for _ in range(2)]
         self._coordinates = [field(self._layout, device) for _ in range(2)]
-        self._out = [wp.zeros(self._layout.size, dtype=lookup.Pixel, device=device) for _ in self._source.quads]
+        self._out = [
+            wp.zeros(self._layout.size, dtype=lookup.Pixel, device=device) for _ in self._source.quads
+        ]
         workers = 1 if device.is_cuda else min(os.cpu_count() or 1, 8)
         self._pool = ThreadPoolExecutor(workers) if workers > 1 else None
         cuts = np.linspace(0, self.height, workers + 1).astype(int)
@@ -139,9 +141,7 @@ class LookUp:
             step = pixels / outputs
             place = [step / 2 - 0.5, step * (axis == 0), step * (axis == 1), pixels / cells]
             inputs = [self._stretched[axis], *self._columns, self._strip.pitch, *place]
-            lookup.stretch_x.launch(
-                self._layout, self.device, inputs, [self._coordinates[axis]], rows=rows
-            )
+            lookup.stretch_x.launch(self._layout, self.device, inputs, [self._coordinates[axis]], rows=rows)
         for quad, out in zip(source.quads, self._out, strict=True):
             inputs = [quad, *self._coordinates, source.width, source.height, *self._edges]
             self._program.launch(self._layout, self.device, inputs, [out], rows=rows)

@@ -48,7 +48,9 @@ def write_gif(path: Path, frames: Sequence[np.ndarray]) -> None:
         stream = out.add_stream("gif", rate=100)
         stream.width, stream.height, stream.pix_fmt = width, height, "pal8"
         stream.codec_context.time_base = HUNDREDTH
-        stream.options = {"gifflags": "-transdiff-offsetting"}  # whole frames: readers that do not composite see them
+        stream.options = {
+            "gifflags": "-transdiff-offsetting"
+        }  # whole frames: readers that do not composite see them
         for _ in frames:
             out.mux(stream.encode(sink.pull()))
         out.mux(stream.encode(None))

@@ -59,7 +59,9 @@ def open_output(path: str | os.PathLike, fps: float, start: int = FIRST_FRAME) -
         return Sequence(path, numbered, start)
     if path.suffix.lower() == ".gif":
         return Gif(path, fps)
-    raise PictureError(f"{path}: cannot tell the output's kind; name it x.gif or a sequence such as x.####.png")
+    raise PictureError(
+        f"{path}: cannot tell the output's kind; name it x.gif or a sequence such as x.####.png"
+    )
 
 
 def write_animation(
@@ -120,7 +122,9 @@ class Gif:
 
     def __init__(self, path: Path, fps: float):
         if fps > 100 / LEAST_DELAY:
-            raise PictureError(f"{path}: a GIF shows at most {100 // LEAST_DELAY} frames a second, not {fps:g}")
+            raise PictureError(
+                f"{path}: a GIF shows at most {100 // LEAST_DELAY} frames a second, not {fps:g}"
+            )
         self.path, self.fps = path, fps
         self.written: list[Path] = []
         self._frames: list[np.ndarray] = []

@@ -30,7 +30,9 @@ _WRITES = {
 }
 """Formats written as stills, and the number types of each, the first one being the default."""
 
-_LINEAR = (".exr", ".hdr")
+_LINEAR = ("half", "float")
+"""Number types that hold linear light; the others hold sRGB."""
+
 _WITHOUT_ALPHA = (".jpg", ".jpeg", ".hdr", ".bmp")
 
 
@@ -135,7 +137,8 @@ def write_picture(path: str | os.PathLike, picture: Picture) -> None:
     ending = path.suffix.lower()
     check_ending(path)
     dtype = picture.dtype if picture.dtype in _WRITES[ending] else _WRITES[ending][0]
-    stored, alpha = encode(picture, dtype, ending in _LINEAR, ending not in _WITHOUT_ALPHA)
+    linear = dtype in _LINEAR
+    stored, alpha = encode(picture, dtype, linear, ending not in _WITHOUT_ALPHA)
     spec = oiio.ImageSpec(picture.metadata) if picture.metadata is not None else oiio.ImageSpec()
     spec.width, spec.height, spec.depth = picture.width, picture.height, 1
     spec.full_width, spec.full_height = picture.width, picture.height
@@ -147,7 +150,7 @@ def write_picture(path: str | os.PathLike, picture: Picture) -> None:
     spec.alpha_channel = -1 if alpha is None else alpha
     for name in ("oiio:UnassociatedAlpha", "oiio:ColorSpace", "compression"):
         spec.erase_attribute(name)
-    if alpha is not None and ending not in _LINEAR:
+    if alpha is not None and not linear:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     with whole_file(path) as temporary:
         out = oiio.ImageOutput.create(str(temporary))
@@ -187,7 +190,7 @@ def check_ending(path: Path) -> None:
         raise PictureError(f"{path}: unknown picture format {path.suffix!r}; known: {', '.join(_WRITES)}")
 
 
-class whole_file:  # noqa: N801 (reads as a verb: with whole_file(path) as temporary)
+class whole_file:
     """A temporary name in the same folder, renamed to `path` on success and removed on failure."""
 
     def __init__(self, path: Path):

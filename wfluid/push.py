@@ -74,7 +74,9 @@ class Push:
             if given.get(key, 0) < 0:
                 raise ValueError(f"push {text!r}: {key} {given[key]:g} is before the animation")
         if "end" in given and given["end"] <= given.get("start", 0.0):
-            raise ValueError(f"push {text!r}: end {given['end']:g} is not after start {given.get('start', 0):g}")
+            raise ValueError(
+                f"push {text!r}: end {given['end']:g} is not after start {given.get('start', 0):g}"
+            )
 
     def force(self, width: int, height: int, duration: float, scheme: str = "standard") -> GaussianForce:
         """The force for a picture of width x height pixels and an animation of `duration` seconds.
@@ -83,7 +85,9 @@ class Push:
             ValueError: the point lies outside the picture, or the window outside the animation.
         """
         if not (0 <= self.x <= width and 0 <= self.y <= height):
-            raise ValueError(f"push at {self.x:g},{self.y:g}: outside the picture of {width} x {height} pixels")
+            raise ValueError(
+                f"push at {self.x:g},{self.y:g}: outside the picture of {width} x {height} pixels"
+            )
         envelope, per_length = self._course(duration, scheme)
         side = max(width, height)
         factor = _PRESSURE * per_length * self.options.get("strength", 1.0) / side

@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 import warp as wp
-
-from wfluid import kernels
 from wfluid.kernels import advection, relaxation
 from wfluid.kernels.cells import HALO, SPAN, Field, Layout, Program, Real, RowReal, Uniform, cells, module_of
+
+from wfluid import kernels
 from wfluid.state import from_numpy, to_numpy
 
 
-@cells
 def numbered(i: int, j: int, k: int, factor: Uniform, row: RowReal, out: Field):
     out[k] = factor * (row + Real(i))
+
+
+numbered = cells(numbered, module="tests.numbered")
 
 
 @pytest.mark.parametrize("size", [(4, 4), (63, 5), (64, 3), (65, 2), (200, 7)], ids=str)
@@ -62,13 +64,16 @@ def test_spans_equal_single_cells_bit_for_bit(device, program, inputs):
         pytest.skip("CUDA kernels run one cell a thread anyhow")
     source = program.func.func
     source.__annotations__.update(ORIGINAL_ANNOTATIONS[program])
-    single = cells(source, span=1)
+    single = cells(source, span=1, module=f"tests.{program.func.key}")
     layout, rng = Layout(70, 9), np.random.default_rng(3)
     arrays = [wp.array(rng.standard_normal(layout.size), dtype=Real, device=device) for _ in range(3)]
     numbers = wp.array([2.5, 0.3, 0.7], dtype=Real, device=device)
     results = []
     for version in (program, single):
-        outs = [wp.zeros(layout.size, dtype=Real, device=device) for _ in range(1 + (program is advection.trace_midpoint))]
+        outs = [
+            wp.zeros(layout.size, dtype=Real, device=device)
+            for _ in range(1 + (program is advection.trace_midpoint))
+        ]
         version.launch(layout, device, inputs(arrays, numbers, layout.pitch), outs)
         results.append([to_numpy(out, layout) for out in outs])
     np.testing.assert_array_equal(*results)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from wfluid.kernels.cells import HALO, Layout
+
 from wfluid.state import field, from_numpy
 from wfluid.walls import Ghosts, Rule, ghost_table
 

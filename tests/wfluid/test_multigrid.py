@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import laplacian_2d, sparse_laplacian
+from oracles import laplacian_2d, sparse_laplacian
 
 from wfluid.grid import Grid
 from wfluid.multigrid import LinearSystem, Points, chebyshev_factors
@@ -138,7 +138,9 @@ def test_face_coefficients_equal_a_sparse_direct_solve(device, size):
     matrix[0, 0] += 1.0
     exact = spsolve(sparse.csc_array(matrix), b.ravel())
     assert residual.relative < 1e-9
-    np.testing.assert_allclose(got.ravel() - got.mean(), exact - exact.mean(), atol=1e-7 * np.abs(exact).max())
+    np.testing.assert_allclose(
+        got.ravel() - got.mean(), exact - exact.mean(), atol=1e-7 * np.abs(exact).max()
+    )
 
 
 def test_the_oracle_itself_has_the_right_null_space():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import divergence, from_streamfunction, laplacian_2d, noise_velocity
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import divergence, from_streamfunction, laplacian_2d, noise_velocity
 
 from wfluid.fluid import Fluid
 from wfluid.forces import Constant, GaussianForce, Instantaneous
@@ -68,7 +68,9 @@ def test_taylor_green_decays_at_the_analytic_rate_to_second_order(make_solver):
         solver = make_solver(n, n, walls="periodic", viscosity=mu, pressure_cycles=5, diffusion_cycles=4)
         grid, steps = solver.grid, n * n // 64
         state = solver.rest()
-        u, v = from_streamfunction(grid, lambda x, y: np.sin(2 * np.pi * x) * np.sin(2 * np.pi * y) / (2 * np.pi))
+        u, v = from_streamfunction(
+            grid, lambda x, y: np.sin(2 * np.pi * x) * np.sin(2 * np.pi * y) / (2 * np.pi)
+        )
         solver.set_velocity(state, u, v)
         state = run(solver, [], steps, end / steps, state)
         x, y = np.arange(n + 1) * grid.hx, (np.arange(n)[:, None] + 0.5) * grid.hy
@@ -255,9 +257,7 @@ def test_bounded_for_any_step_force_and_viscosity(device, walls, viscosity, dt, 
     assert max(np.abs(f).max() for f in state.velocity) <= bound
 
 
-@pytest.mark.parametrize(
-    ("dt", "says"), [(-0.1, "expected 0"), (float("nan"), "expected 0"), (11.0, "10")]
-)
+@pytest.mark.parametrize(("dt", "says"), [(-0.1, "expected 0"), (float("nan"), "expected 0"), (11.0, "10")])
 def test_steps_beyond_the_limits_are_refused_with_the_limit(make_solver, dt, says):
     solver = make_solver(8, 8)
     with pytest.raises(ValueError, match=says):
@@ -279,5 +279,7 @@ def test_replayed_steps_follow_changed_inputs(make_solver):
     solver.step(now, after, forces[:1], 0.0, 0.05)
     solver.step(now, after, forces[1:], 0.0, 0.02)
     fresh = run(make_solver(32, 32), forces[1:], 1, 0.02)
-    for replayed, expected in zip(after.velocity + after.displacement, fresh.velocity + fresh.displacement, strict=True):
+    for replayed, expected in zip(
+        after.velocity + after.displacement, fresh.velocity + fresh.displacement, strict=True
+    ):
         np.testing.assert_array_equal(replayed, expected)

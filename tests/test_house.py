@@ -1,0 +1,65 @@
+"""The house rules: public names are documented and complete, imports run one way."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import pytest
+
+import wfluid
+
+ROOT = Path(__file__).parents[1]
+ORDER = [
+    "cells", "walls", "state", "multigrid", "solver", "animation", "output", "report", "cli",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [name for name in wfluid.__all__ if name != "__version__"])
+def test_every_public_name_exists_and_is_documented(name):
+    thing = getattr(wfluid, name)
+    assert inspect.getdoc(thing)
+    if inspect.isclass(thing):
+        for attribute, value in vars(thing).items():
+            if not attribute.startswith("_") and inspect.isfunction(value):
+                assert inspect.getdoc(value), f"{name}.{attribute} has no docstring"
+
+
+def test_unknown_names_are_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = wfluid.nothing
+
+
+def imported_by(path):
+    """Modules of the package that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("wfluid"):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_device_code_knows_no_host_code():
+    for path in (ROOT / "kernels").glob("*.py"):
+        for module in imported_by(path):
+            assert module.startswith("wfluid.kernels"), f"{path.name} imports {module}"
+
+
+def test_imports_run_one_way():
+    """A later module of ORDER may import an earlier one, never the other way."""
+    for position, name in enumerate(ORDER[1:], start=1):
+        later = {f"wfluid.{other}" for other in ORDER[position + 1 :]}
+        path = ROOT / "wfluid" / f"{name}.py"
+        assert not later & set(imported_by(path)), f"{name} imports what stands above it"
+
+
+@pytest.mark.parametrize(
+    ("library", "home"), [("OpenImageIO", {"picture", "output", "report"}), ("av", {"movie"})]
+)
+def test_heavy_libraries_are_imported_by_their_wrappers_only_and_late(library, home):
+    for path in (ROOT / "wfluid").glob("*.py"):
+        tree = ast.parse(path.read_text())
+        names = {
+            alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names
+        }
+        assert library not in names or path.stem in home, f"{path.name} imports {library}"
+        at_top = {alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}
+        assert library not in at_top
