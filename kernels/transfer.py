@@ -2,8 +2,9 @@
 
 A fine point at coarse position c + t (c whole) is interpolated linearly, (1 - t) e[c] + t e[c + 1],
 where e's ghosts hold the walls. The tables are computed per axis for any two sizes
-(`wfluid.multigrid`), so odd and prime sizes need no special case; their rows and columns count the halo. Restriction is the transpose of
-that, scaled by the ratio of the two sizes: at most four fine points a coarse one and axis.
+(`wfluid.multigrid`), so odd and prime sizes need no special case; their rows and columns count the
+halo. Restriction is the transpose of that, scaled by the ratio of the two sizes: at most four fine
+points a coarse one and axis.
 
 Each direction runs where it is cheapest: restriction first along y (whole rows with one weight
 each), then along x on the fewer rows left; prolongation in the opposite order.

@@ -6,6 +6,7 @@ over a step, so that the impulse of a force does not depend on the step.
 
 from __future__ import annotations
 
+import itertools
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
@@ -89,7 +90,7 @@ class Arbitrary:
             middle = self.function((start + end) / 2)
             return (end - start) / 6 * (self.function(start) + 4 * middle + self.function(end))
         knots = sorted({start, end, *(t for t in self.times if start < t < end)})
-        return sum((b - a) * self._at((a + b) / 2) for a, b in zip(knots, knots[1:], strict=False))
+        return sum((b - a) * self._at((a + b) / 2) for a, b in itertools.pairwise(knots))
 
     def _at(self, t: float) -> float:
         if not self.times[0] <= t <= self.times[-1]:

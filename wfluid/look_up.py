@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 from concurrent.futures import ThreadPoolExecutor
 
@@ -93,7 +94,7 @@ class LookUp:
         workers = 1 if device.is_cuda else min(os.cpu_count() or 1, 8)
         self._pool = ThreadPoolExecutor(workers) if workers > 1 else None
         cuts = np.linspace(0, self.height, workers + 1).astype(int)
-        self._strips = [self._capture(rows) for rows in zip(cuts, cuts[1:], strict=False)]
+        self._strips = [self._capture(rows) for rows in itertools.pairwise(cuts)]
 
     def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
         """The picture under the displacements d_x, d_y [cells], fields with ghosts."""

@@ -13,8 +13,11 @@ O(dt^2) a step.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import warp as wp
@@ -52,8 +55,10 @@ class SolveReport:
 class Solver:
     """Steps fluids of one grid and one kind on one device.
 
-    Building one loads the kernels. Each pair of states stepped between is captured as one graph and
-    replayed from then on; the time, the step and the forces' numbers are read from device memory.
+    Building one loads the kernels. For each pair of states stepped between, the stages are captured as
+    graphs and replayed from then on; the time, the step and the forces' numbers are read from device
+    memory. On a CPU, stages that do not need each other run side by side: u beside v, then the map
+    beside the projection.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
@@ -61,8 +66,9 @@ class Solver:
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
         walls, size, shape = fluid.walls, (grid.width, grid.height), (grid.nx, grid.ny)
-        self._u_ghosts = Ghosts(self.layout, walls.u_rules(), device)
-        self._v_ghosts = Ghosts(self.layout, walls.v_rules(), device)
+        self._velocity_ghosts = [
+            Ghosts(self.layout, rules, device) for rules in (walls.u_rules(), walls.v_rules())
+        ]
         self._d_x_ghosts = Ghosts(self.layout, walls.moved_x_rules(), device)
         self._d_y_ghosts = Ghosts(self.layout, walls.moved_y_rules(), device)
         self._pressure = LinearSystem(*shape, Points(size, walls.centre_rules()), device)
@@ -78,7 +84,9 @@ class Solver:
         self._inverse_h = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
         self._one = wp.array([1.0], dtype=Real, device=device)
         self._controls: dict[int, _Controls] = {}
-        self._graphs: dict[tuple, tuple[wp.Graph, State, State]] = {}
+        self._graphs: dict[tuple, tuple[list[list[wp.Graph]], State, State]] = {}
+        cores = 1 if device.is_cuda else os.cpu_count() or 1
+        self._pool = ThreadPoolExecutor(2) if cores > 1 else None
 
     def rest(self) -> State:
         """A new state: a still fluid under an untouched picture."""
@@ -86,7 +94,7 @@ class Solver:
 
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
         """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
-        for values, f, ghosts in ((u, state.u, self._u_ghosts), (v, state.v, self._v_ghosts)):
+        for values, f, ghosts in zip((u, v), (state.u, state.v), self._velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
             ghosts.fill(f)
 
@@ -113,10 +121,15 @@ class Solver:
             self._pressure.prepare(self.fluid.pressure_cycles)
             for system in self._diffusion:
                 system.prepare(self.fluid.diffusion_cycles)
-            with wp.ScopedCapture(device=self.device) as capture:
-                self._launch(state_in, state_out, controls, diffuses)
-            self._graphs[key] = (capture.graph, state_in, state_out)
-        wp.capture_launch(self._graphs[key][0])
+            stages = self._stages(state_in, state_out, controls, diffuses)
+            graphs = [[self._capture(work) for work in stage] for stage in stages]
+            self._graphs[key] = (graphs, state_in, state_out)
+        for stage in self._graphs[key][0]:
+            if self._pool and len(stage) > 1:
+                list(self._pool.map(wp.capture_launch, stage))
+            else:
+                for graph in stage:
+                    wp.capture_launch(graph)
 
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
@@ -142,8 +155,9 @@ class Solver:
         """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
         for system in self._diffusion:
             system.set_coefficients(1.0, dt * self.fluid.viscosity)
-        for diffused, out in zip(self._diffuse((state_in.u, state_in.v)), state_out.arrays, strict=False):
-            wp.copy(out, diffused)
+        for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
+            self._diffuse(axis, f)
+            wp.copy(out, self._diffused[axis])
 
     def project(self, state_in: State, state_out: State) -> None:
         """Only project the velocity; the map of `state_out` is untouched."""
@@ -153,13 +167,33 @@ class Solver:
         multigrid = self.fluid.solver == "multigrid"
         return getattr(self.fluid, f"{solve}_cycles") if multigrid else self.fluid.sweeps
 
-    def _launch(self, state_in: State, state_out: State, controls: _Controls, diffuses: bool) -> None:
-        self._trace(state_in, controls)
-        v1 = self._push(state_in, controls)
-        self._carry_map(state_in, state_out)
-        v2 = self._advect(v1)
-        v3 = self._diffuse(v2) if diffuses else v2
-        self._project(v3, state_out)
+    def _stages(
+        self, state_in: State, state_out: State, controls: _Controls, diffuses: bool
+    ) -> list[list[Callable[[], None]]]:
+        """The step as stages, one after the other, of works that may run side by side."""
+        v1 = self._pushed if controls.count else (state_in.u, state_in.v)
+        v2 = self._carried
+        v3 = self._diffused if diffuses else v2
+
+        def begin() -> None:
+            self._trace(state_in, controls)
+            self._push(state_in, controls)
+
+        def component(axis: int) -> None:
+            self._advect(axis, v1[axis])
+            if diffuses:
+                self._diffuse(axis, v2[axis])
+
+        return [
+            [begin],
+            [partial(component, 0), partial(component, 1)],
+            [partial(self._project, v3, state_out), partial(self._carry_map, state_in, state_out)],
+        ]
+
+    def _capture(self, work: Callable[[], None]) -> wp.Graph:
+        with wp.ScopedCapture(device=self.device) as capture:
+            work()
+        return capture.graph
 
     def _where(self) -> list[int]:
         periodic_x, periodic_y = self.fluid.walls.periodic
@@ -172,16 +206,13 @@ class Solver:
         self._d_x_ghosts.fill(self._foot_x)
         self._d_y_ghosts.fill(self._foot_y)
 
-    def _push(self, state: State, controls: _Controls) -> tuple[wp.array, wp.array]:
-        if not controls.count:
-            return state.u, state.v
-        u, v = self._pushed
-        wp.copy(u, state.u)
-        wp.copy(v, state.v)
-        controls.push(self.grid, self.fluid, self.layout, u, v)
-        self._u_ghosts.fill(u)
-        self._v_ghosts.fill(v)
-        return u, v
+    def _push(self, state: State, controls: _Controls) -> None:
+        if controls.count:
+            for f, pushed in zip((state.u, state.v), self._pushed, strict=True):
+                wp.copy(pushed, f)
+            controls.push(self.grid, self.fluid, self.layout, *self._pushed)
+            for pushed, ghosts in zip(self._pushed, self._velocity_ghosts, strict=True):
+                ghosts.fill(pushed)
 
     def _carry_map(self, state_in: State, state_out: State) -> None:
         paper = self.fluid.scheme == "paper"
@@ -191,31 +222,26 @@ class Solver:
         self._d_x_ghosts.fill(state_out.d_x)
         self._d_y_ghosts.fill(state_out.d_y)
 
-    def _advect(self, velocity: tuple[wp.array, wp.array]) -> tuple[wp.array, wp.array]:
+    def _advect(self, axis: int, f: wp.array) -> None:
         paper = self.fluid.scheme == "paper"
         advect = advection.advect_face_bilinear if paper else advection.advect_face_cubic
-        for f, out, before in zip(velocity, self._carried, (1, self.layout.pitch), strict=True):
-            inputs = [f, self._foot_x, self._foot_y, before, *self._where()]
-            advect.launch(self.layout, self.device, inputs, [out])
-        self._u_ghosts.fill(self._carried[0])
-        self._v_ghosts.fill(self._carried[1])
-        return self._carried
+        before = (1, self.layout.pitch)[axis]
+        inputs = [f, self._foot_x, self._foot_y, before, *self._where()]
+        advect.launch(self.layout, self.device, inputs, [self._carried[axis]])
+        self._velocity_ghosts[axis].fill(self._carried[axis])
 
-    def _diffuse(self, velocity: tuple[wp.array, wp.array]) -> tuple[wp.array, wp.array]:
-        """V3 = v2 + the solution of A change = v2 - A v2.
+    def _diffuse(self, axis: int, f: wp.array) -> None:
+        """Diffused = f + the solution of A change = f - A f, for one component.
 
         Solving for the change keeps uniform motion exact and makes the solver's residual one of the
         change, not of the velocity; with a symmetric solver M the adjoint is 1 + (1 - A) M.
         """
-        for system, f, change, answer, out in zip(
-            self._diffusion, velocity, self._change, self._answer, self._diffused, strict=True
-        ):
-            top = system.levels[0]
-            top.residual(f, f, change)
-            self._solve(system, change, answer, self.fluid.diffusion_cycles)
-            relaxation.add_scaled.launch(self.layout, self.device, [f, answer, self._one], [out])
-            top.ghosts.fill(out)
-        return self._diffused
+        system, change, answer = self._diffusion[axis], self._change[axis], self._answer[axis]
+        system.levels[0].residual(f, f, change)
+        self._solve(system, change, answer, self.fluid.diffusion_cycles)
+        inputs, out = [f, answer, self._one], self._diffused[axis]
+        relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
+        self._velocity_ghosts[axis].fill(out)
 
     def _project(self, velocity: tuple[wp.array, wp.array], state_out: State) -> None:
         x, y = self._inverse_h[0:1], self._inverse_h[1:2]
@@ -225,8 +251,8 @@ class Solver:
         self._solve(self._pressure, self._minus_div, self._q, self.fluid.pressure_cycles)
         inputs = [*velocity, self._q, x, y, pitch]
         projection.subtract_gradient.launch(self.layout, self.device, inputs, [state_out.u, state_out.v])
-        self._u_ghosts.fill(state_out.u)
-        self._v_ghosts.fill(state_out.v)
+        for f, ghosts in zip((state_out.u, state_out.v), self._velocity_ghosts, strict=True):
+            ghosts.fill(f)
 
     def _solve(self, system: LinearSystem, b: wp.array, x: wp.array, cycles: int) -> None:
         if self.fluid.solver == "multigrid":

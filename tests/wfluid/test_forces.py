@@ -1,5 +1,6 @@
 """Envelopes integrate exactly, forces have their shape, pushes carry as far as their arrow."""
 
+import itertools
 import math
 
 import numpy as np
@@ -47,7 +48,7 @@ def test_impulses_of_steps_add_up(at, cuts):
     """However the time is cut into steps, a blow strikes once and integrals add."""
     edges = [0.0, *sorted(cuts), 2.0]
     for envelope in (*ENVELOPES.values(), Instantaneous(at)):
-        parts = sum(envelope.integral(a, b) for a, b in zip(edges, edges[1:], strict=False))
+        parts = sum(envelope.integral(a, b) for a, b in itertools.pairwise(edges))
         assert parts == pytest.approx(envelope.integral(0.0, 2.0), abs=1e-9)
 
 

@@ -170,7 +170,7 @@ def test_nothing_flows_through_walls(make_solver, walls):
     assert np.all(u[:, [0, -1]] == 0)
     if not solver.fluid.walls.periodic[1]:
         assert np.all(v[[0, -1], :] == 0)
-    d_x, d_y = state.displacement
+    d_x, _d_y = state.displacement
     x = (np.arange(32) + 0.5) * solver.grid.hx + d_x
     assert x.min() > -1e-4 and x.max() < solver.grid.width + 1e-4
     if walls == "no-slip":
