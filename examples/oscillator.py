@@ -28,7 +28,8 @@ def animation(periods=2.0, fps=15.0, cells=256, width=480, device=None):
     """The two oscillators on the raccoon, as an `Animation`."""
     picture = read_picture(PICTURE)
     duration = periods * PERIOD
-    forces = [Push.parse(push).force(picture.width, picture.height, duration) for push in (NOSE, MOUTH)]
+    whole = max(duration, PERIOD)  # a shorter run shows the beginning of the same motion
+    forces = [Push.parse(push).force(picture.width, picture.height, whole) for push in (NOSE, MOUTH)]
     height = round(width * picture.height / picture.width)
     return Animation(
         picture,

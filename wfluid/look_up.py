@@ -96,8 +96,8 @@ class LookUp:
         cuts = np.linspace(0, self.height, workers + 1).astype(int)
         self._strips = [self._capture(rows) for rows in itertools.pairwise(cuts)]
 
-    def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
-        """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
+    def launch(self, d_x: wp.array, d_y: wp.array) -> None:
+        """Compute the coordinates and pixels of `render`, left in device memory."""
         for d, ghosts, out in zip((d_x, d_y), self._ghosts, self._stretched, strict=True):
             lookup.stretch_y.launch(self._strip, self.device, [d, *self._rows, self._grid.pitch], [out])
             ghosts.fill(out)
@@ -105,6 +105,10 @@ class LookUp:
             list(self._pool.map(wp.capture_launch, self._strips))
         else:
             wp.capture_launch(self._strips[0])
+
+    def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
+        """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
+        self.launch(d_x, d_y)
         quads = [self._to_numpy(out) for out in self._out]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
         pixels = np.ascontiguousarray(pixels[..., : self._source.channels], dtype=np.float32)
@@ -115,7 +119,7 @@ class LookUp:
 
         Counted from the centre of the source's first pixel.
         """
-        self.render(d_x, d_y)
+        self.launch(d_x, d_y)
         layout = self._layout
         grids = [
             f.numpy()[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch)
