@@ -110,6 +110,14 @@ FAR = wp.constant(Real(1.0e8))
 """Source coordinates are stopped here [px], so that they fit an integer."""
 
 
+@wp.func
+def whole_and_fraction(coordinate: Real):
+    """A source coordinate [px] as the pixel before it and the part of a pixel past that."""
+    stopped = wp.min(wp.max(coordinate, -FAR), FAR)
+    before = wp.floor(stopped)
+    return int(before), stopped - before
+
+
 @cells
 def look_up_nearest(
     i: int,
@@ -126,8 +134,9 @@ def look_up_nearest(
     out: Pixels,
 ):
     """The pixel whose square holds the source."""
-    x = int(wp.floor(wp.clamp(source_x[k], -FAR, FAR) + Real(0.5)))
-    y = int(wp.floor(wp.clamp(source_y[k], -FAR, FAR) + Real(0.5)))
+    k = inside(k)
+    x, _tx = whole_and_fraction(source_x[k] + Real(0.5))
+    y, _ty = whole_and_fraction(source_y[k] + Real(0.5))
     out[k] = pixel(picture, x, y, width, height, edge_x, edge_y)
 
 
@@ -147,24 +156,75 @@ def look_up_bilinear(
     out: Pixels,
 ):
     """Bilinear between the four pixels around the source."""
-    x = wp.clamp(source_x[k], -FAR, FAR)
-    y = wp.clamp(source_y[k], -FAR, FAR)
-    column = int(wp.floor(x))
-    row = int(wp.floor(y))
-    tx = x - wp.floor(x)
-    ty = y - wp.floor(y)
+    k = inside(k)
+    x, tx = whole_and_fraction(source_x[k])
+    y, ty = whole_and_fraction(source_y[k])
     sx = Real(1.0) - tx
-    north = sx * pixel(picture, column, row, width, height, edge_x, edge_y)
-    north += tx * pixel(picture, column + 1, row, width, height, edge_x, edge_y)
-    south = sx * pixel(picture, column, row + 1, width, height, edge_x, edge_y)
-    south += tx * pixel(picture, column + 1, row + 1, width, height, edge_x, edge_y)
-    out[k] = (Real(1.0) - ty) * north + ty * south
+    if x >= 0 and y >= 0 and x + 1 < width and y + 1 < height:
+        at = entry(y * width + x)
+        below = entry(y * width + width + x)
+        north = sx * picture[at] + tx * picture[at + 1]
+        south = sx * picture[below] + tx * picture[below + 1]
+        out[k] = (Real(1.0) - ty) * north + ty * south
+    else:
+        north = sx * pixel(picture, x, y, width, height, edge_x, edge_y)
+        north += tx * pixel(picture, x + 1, y, width, height, edge_x, edge_y)
+        south = sx * pixel(picture, x, y + 1, width, height, edge_x, edge_y)
+        south += tx * pixel(picture, x + 1, y + 1, width, height, edge_x, edge_y)
+        out[k] = (Real(1.0) - ty) * north + ty * south
+
+
+_REAL = f"wp::{Real.__name__}"
+_CUBIC_INSIDE = f"""
+    __builtin_assume(at >= 0);
+    wp::vec_t<4, {_REAL}> value;
+#if defined(__CUDA_ARCH__)
+    typedef wp::vec_t<4, {_REAL}> four;
+#else
+    typedef {_REAL} four __attribute__((vector_size(4 * sizeof({_REAL})), aligned(sizeof({_REAL})), may_alias));
+#endif
+    // weights of the four points, as polynomials of the fraction: Catmull and Rom's matrix
+    const four c0 = {{0, 1, 0, 0}}, c1 = {{-0.5, 0, 0.5, 0}};
+    const four c2 = {{1, -2.5, 2, -0.5}}, c3 = {{-0.5, 1.5, -1.5, 0.5}};
+    const four x = c0 + tx * (c1 + tx * (c2 + tx * c3));
+    const four y = c0 + ty * (c1 + ty * (c2 + ty * c3));
+    const four* p = (const four*)(picture.data + at);
+    four sum = y[0] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
+    p += width;
+    sum += y[1] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
+    p += width;
+    sum += y[2] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
+    p += width;
+    sum += y[3] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
+    memcpy(&value, &sum, sizeof(value));
+    return value;
+"""
+
+
+@wp.func_native(_CUBIC_INSIDE)
+def cubic_inside(picture: Pixels, at: int, width: int, tx: Real, ty: Real) -> Pixel:
+    """Catmull-Rom over 4 x 4 pixels that all lie inside the picture, `at` the first of them.
+
+    In native code, for the four channels side by side in one register: half the time.
+    """
+    ...
 
 
 @wp.func
-def row_of_four(picture: Pixels, at: int, a: Real, b: Real, c: Real, d: Real):
-    """Four neighbouring pixels of one row inside the picture, weighted."""
-    return a * picture[at] + b * picture[at + 1] + c * picture[at + 2] + d * picture[at + 3]
+def cubic_at_edges(
+    picture: Pixels, x: int, y: int, tx: Real, ty: Real, width: int, height: int, edge_x: int, edge_y: int
+):
+    """The same over pixels some of which lie beyond the picture's edges; (x, y) is the first."""
+    wx = Pixel(outer_weight(tx), inner_weight(tx), inner_weight(Real(1.0) - tx), outer_weight(Real(1.0) - tx))
+    wy = Pixel(outer_weight(ty), inner_weight(ty), inner_weight(Real(1.0) - ty), outer_weight(Real(1.0) - ty))
+    value = Pixel()
+    for m in range(4):
+        line = wx[0] * pixel(picture, x, y + m, width, height, edge_x, edge_y)
+        line += wx[1] * pixel(picture, x + 1, y + m, width, height, edge_x, edge_y)
+        line += wx[2] * pixel(picture, x + 2, y + m, width, height, edge_x, edge_y)
+        line += wx[3] * pixel(picture, x + 3, y + m, width, height, edge_x, edge_y)
+        value += wy[m] * line
+    return value
 
 
 @cells
@@ -183,29 +243,10 @@ def look_up_cubic(
     out: Pixels,
 ):
     """Catmull-Rom over the sixteen pixels around the source."""
-    x = wp.clamp(source_x[k], -FAR, FAR)
-    y = wp.clamp(source_y[k], -FAR, FAR)
-    column = int(wp.floor(x)) - 1
-    row = int(wp.floor(y)) - 1
-    tx = x - wp.floor(x)
-    ty = y - wp.floor(y)
-    a = outer_weight(tx)
-    b = inner_weight(tx)
-    c = inner_weight(Real(1.0) - tx)
-    d = outer_weight(Real(1.0) - tx)
-    wy = Pixel(outer_weight(ty), inner_weight(ty), inner_weight(Real(1.0) - ty), outer_weight(Real(1.0) - ty))
-    value = Pixel()
-    if column >= 0 and row >= 0 and column + 3 < width and row + 3 < height:
-        at = inside(row * width + column + 4) - 4
-        value += wy[0] * row_of_four(picture, at, a, b, c, d)
-        value += wy[1] * row_of_four(picture, at + width, a, b, c, d)
-        value += wy[2] * row_of_four(picture, at + 2 * width, a, b, c, d)
-        value += wy[3] * row_of_four(picture, at + 3 * width, a, b, c, d)
+    k = inside(k)
+    x, tx = whole_and_fraction(source_x[k])
+    y, ty = whole_and_fraction(source_y[k])
+    if x >= 1 and y >= 1 and x + 2 < width and y + 2 < height:
+        out[k] = cubic_inside(picture, (y - 1) * width + x - 1, width, tx, ty)
     else:
-        for m in range(4):
-            line = a * pixel(picture, column, row + m, width, height, edge_x, edge_y)
-            line += b * pixel(picture, column + 1, row + m, width, height, edge_x, edge_y)
-            line += c * pixel(picture, column + 2, row + m, width, height, edge_x, edge_y)
-            line += d * pixel(picture, column + 3, row + m, width, height, edge_x, edge_y)
-            value += wy[m] * line
-    out[k] = value
+        out[k] = cubic_at_edges(picture, x - 1, y - 1, tx, ty, width, height, edge_x, edge_y)
