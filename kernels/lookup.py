@@ -181,7 +181,8 @@ _CUBIC_INSIDE = f"""
 #if defined(__CUDA_ARCH__)
     typedef wp::vec_t<4, {_REAL}> four;
 #else
-    typedef {_REAL} four __attribute__((vector_size(4 * sizeof({_REAL})), aligned(sizeof({_REAL})), may_alias));
+    typedef {_REAL} four
+        __attribute__((vector_size(4 * sizeof({_REAL})), aligned(sizeof({_REAL})), may_alias));
 #endif
     // weights of the four points, as polynomials of the fraction: Catmull and Rom's matrix
     const four c0 = {{0, 1, 0, 0}}, c1 = {{-0.5, 0, 0.5, 0}};

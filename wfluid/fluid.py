@@ -34,8 +34,9 @@ class Fluid:
     """"multigrid" (the standard scheme's default) or "jacobi" (the paper's)."""
     pressure_cycles: int = 3
     """Multigrid cycles a projection: 3 leave 3e-4 of the divergence, 4 leave 1.4e-5."""
-    diffusion_cycles: int = 2
-    """Multigrid cycles a diffusion: 2 leave 4e-3 of the step's change."""
+    diffusion_tolerance: float = 7e-3
+    """Part of a step's viscous change that a diffusion may leave undone, 1e-12 … 0.5: Chebyshev sweeps
+    where few of them do, else two or more multigrid cycles."""
     sweeps: int = 50
     """Jacobi sweeps a solve, with solver="jacobi"."""
 
@@ -47,9 +48,11 @@ class Fluid:
         if self.solver is None:
             object.__setattr__(self, "solver", "jacobi" if self.scheme == "paper" else "multigrid")
         _one_of("solver", self.solver, SOLVERS)
-        for name in ("pressure_cycles", "diffusion_cycles", "sweeps"):
+        for name in ("pressure_cycles", "sweeps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) >= 1):
                 raise ValueError(f"{name} {getattr(self, name)}: expected a whole number from 1 on")
+        if not 1e-12 <= self.diffusion_tolerance <= 0.5:
+            raise ValueError(f"diffusion_tolerance {self.diffusion_tolerance}: expected 1e-12 … 0.5")
 
 
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:

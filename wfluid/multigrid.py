@@ -1,10 +1,11 @@
-"""Linear solves: symmetric multigrid cycles, and plain Jacobi sweeps.
+"""Linear solves: symmetric multigrid cycles, Chebyshev sweeps and plain Jacobi sweeps.
 
-Both solve (shift - scale Lap) x = b on one kind of grid point (centres, x-faces or y-faces):
+All solve (shift - scale Lap) x = b on one kind of grid point (centres, x-faces or y-faces):
 diffusion has shift 1 and scale dt mu, pressure shift 0 and scale 1, with face coefficients where
 something resists (div beta grad). A fixed number of V-cycles from zero, with the same sweeps before
 and after in opposite order and a restriction that is the prolongation's transpose, is a symmetric
-linear operator: its adjoint is itself, converged or not.
+linear operator: its adjoint is itself, converged or not. So is a fixed polynomial of the operator,
+which is what sweeps are.
 
 Coarsening n -> ceil(n/2) per axis until at most `DENSE` unknowns are left, which a stored inverse
 solves exactly. W. Briggs, V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
@@ -12,6 +13,7 @@ solves exactly. W. Briggs, V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +31,9 @@ SMOOTHED = 0.45
 """Least eigenvalue of D^-1 A that the sweeps damp; what lies below is smooth and left to the coarser
 level. Measured at 256 x 256: three cycles leave 2.3e-4 to 3.0e-4 for any value from 0.3 to 0.6."""
 
+SWEEP_LIMIT = 14
+"""Chebyshev sweeps that cost about as much as two cycles."""
+
 CYCLE_INTERVAL = (0.8, 1.0)
 """Where the eigenvalues of one cycle times A lie; the cycles' Chebyshev factors damp this interval."""
 
@@ -39,10 +44,28 @@ def chebyshev_factors(low: float, high: float, count: int) -> np.ndarray:
     return 1.0 / ((high + low) / 2 + (high - low) / 2 * np.cos(angles))
 
 
+def chebyshev_count(low: float, high: float, tolerance: float) -> int:
+    """The least degree whose Chebyshev polynomial on [low, high] leaves `tolerance` of what it damps."""
+    if high - low < 1e-12 * high:
+        return 1
+    return max(1, math.ceil(math.acosh(1 / tolerance) / math.acosh((high + low) / (high - low))))
+
+
+@dataclass(frozen=True)
+class Solve:
+    """How a system is solved: a method and how often it is applied. Linear and symmetric, all three."""
+
+    method: str
+    """"multigrid", "chebyshev" or "jacobi"."""
+    iterations: int
+    """Cycles or sweeps, from zero."""
+
+
 @dataclass(frozen=True)
 class Residual:
-    """What a solve left: how many cycles or sweeps it ran, ||b - A x|| and ||b||."""
+    """What a solve left: the method, how many cycles or sweeps it ran, ||b - A x|| and ||b||."""
 
+    method: str
     iterations: int
     norm: float
     norm_b: float
@@ -176,6 +199,7 @@ class LinearSystem:
         self.zero, self.left, self.correction, self.spare = (field(top, device) for _ in range(4))
         self.inverse = wp.zeros((nx * ny) ** 2, dtype=Real, device=device)
         self._factors: dict[int, wp.array] = {}
+        self._rates = wp.zeros(SWEEP_LIMIT, dtype=Real, device=device)
         self._coefficients: tuple[float, float] | None = None
 
     def set_coefficients(self, shift: float, scale: float) -> None:
@@ -209,16 +233,43 @@ class LinearSystem:
         inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True)
         self.inverse.assign(inverse.ravel())
 
-    def prepare(self, cycles: int) -> None:
-        """Put the Chebyshev factors of `cycles` cycles on the device, before a graph is captured."""
-        if cycles not in self._factors:
+    def plan(self, tolerance: float) -> Solve:
+        """The cheapest solve that leaves at most `tolerance` of any right-hand side.
+
+        Chebyshev sweeps where the operator is close enough to the identity that few of them do, which
+        they do to the bound of the polynomial; else multigrid.
+        """
+        shift, scale = self._coefficients
+        centre = shift + 2 * scale * sum(h**-2 for h in self.levels[0].h)
+        least = shift / centre
+        sweeps = chebyshev_count(least, 2 - least, tolerance) if least > 0 else SWEEP_LIMIT + 1
+        if sweeps > SWEEP_LIMIT:
+            return Solve("multigrid", chebyshev_count(*CYCLE_INTERVAL, tolerance))
+        factors = chebyshev_factors(least, 2 - least, sweeps)
+        factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]  # short and long in turn
+        self._rates.assign(np.pad(factors / centre, (0, SWEEP_LIMIT - sweeps)))
+        return Solve("chebyshev", sweeps)
+
+    def solve(self, how: Solve, b: wp.array, x: wp.array) -> None:
+        """X = what `how` makes of b. Fills the ghosts of b and x."""
+        if how.method == "multigrid":
+            self.multigrid(b, x, how.iterations)
+        elif how.method == "chebyshev":
+            self._sweep(b, x, [self._rates[n : n + 1] for n in range(how.iterations)])
+        else:
+            self._sweep(b, x, [self.levels[0].plain] * how.iterations)
+
+    def prepare(self, how: Solve) -> None:
+        """Put the Chebyshev factors of the cycles on the device, before a graph is captured."""
+        cycles = how.iterations
+        if how.method == "multigrid" and cycles not in self._factors:
             factors = chebyshev_factors(*CYCLE_INTERVAL, cycles) if cycles > 1 else np.ones(1)
             self._factors[cycles] = wp.array(factors, dtype=Real, device=self.device)
 
     def multigrid(self, b: wp.array, x: wp.array, cycles: int) -> None:
         """X = `cycles` V-cycles on b, from zero. Fills the ghosts of b and x."""
         top = self.levels[0]
-        self.prepare(cycles)
+        self.prepare(Solve("multigrid", cycles))
         factors = self._factors[cycles]
         top.ghosts.fill(b)
         at, other = (x, self.spare) if cycles % 2 else (self.spare, x)
@@ -234,13 +285,13 @@ class LinearSystem:
             relaxation.add_scaled.launch(top.layout, self.device, inputs, [at])
             top.ghosts.fill(at)
 
-    def jacobi(self, b: wp.array, x: wp.array, sweeps: int) -> None:
-        """X = `sweeps` plain Jacobi sweeps on b, from zero: the paper's solver. Fills b's and x's ghosts."""
+    def _sweep(self, b: wp.array, x: wp.array, rates: list[wp.array]) -> None:
+        """X = one Jacobi sweep for each of `rates`, from zero."""
         top = self.levels[0]
         top.ghosts.fill(b)
-        at, other = (x, self.spare) if sweeps % 2 else (self.spare, x)
-        for sweep in range(sweeps):
-            top.smooth(b, other if sweep else self.zero, top.plain, at)
+        at, other = (x, self.spare) if len(rates) % 2 else (self.spare, x)
+        for n, rate in enumerate(rates):
+            top.smooth(b, other if n else self.zero, rate, at)
             at, other = other, at
 
     def _cycle(self, depth: int, b: wp.array, out: wp.array) -> None:
@@ -261,13 +312,13 @@ class LinearSystem:
         level.smooth(b, level.y, level.second, level.x)
         level.smooth(b, level.x, level.first, out)
 
-    def measure(self, b: wp.array, x: wp.array, iterations: int) -> Residual:
-        """The true residual of a solve that ran `iterations`."""
+    def measure(self, how: Solve, b: wp.array, x: wp.array) -> Residual:
+        """The true residual of a solve."""
         top = self.levels[0]
         top.residual(b, x, self.left)
         top.ghosts.fill(self.left)
         top.ghosts.fill(b)
-        return Residual(iterations, norm(self.left, top.layout)[0], norm(b, top.layout)[0])
+        return Residual(how.method, how.iterations, norm(self.left, top.layout)[0], norm(b, top.layout)[0])
 
 
 def norm(f: wp.array, layout: Layout) -> tuple[float, float]:

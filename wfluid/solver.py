@@ -29,7 +29,7 @@ from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, relaxation, transport
 from wfluid.kernels import forces as force_kernels
 from wfluid.kernels.cells import Layout, Real
-from wfluid.multigrid import LinearSystem, Points, Residual, norm
+from wfluid.multigrid import LinearSystem, Points, Residual, Solve, norm
 from wfluid.state import State, field, from_numpy
 from wfluid.walls import Ghosts
 
@@ -73,6 +73,9 @@ class Solver:
         self._d_y_ghosts = Ghosts(self.layout, walls.moved_y_rules(), device)
         self._pressure = LinearSystem(*shape, Points(size, walls.centre_rules()), device)
         self._pressure.set_coefficients(0.0, 1.0)
+        self._solve_pressure = self._how(Solve("multigrid", fluid.pressure_cycles))
+        self._pressure.prepare(self._solve_pressure)
+        self._solve_diffusion = Solve("none", 0)
         self._diffusion = (
             LinearSystem(*shape, Points(size, walls.u_rules(), (True, False)), device),
             LinearSystem(*shape, Points(size, walls.v_rules(), (False, True)), device),
@@ -114,13 +117,9 @@ class Solver:
         controls = self._controls.setdefault(len(forces), _Controls(len(forces), self.device))
         controls.set(self.grid, forces, t, dt)
         if diffuses:
-            for system in self._diffusion:
-                system.set_coefficients(1.0, dt * self.fluid.viscosity)
-        key = (id(state_in), id(state_out), len(forces), diffuses)
+            self._plan_diffusion(dt)
+        key = (id(state_in), id(state_out), len(forces), diffuses and self._solve_diffusion)
         if key not in self._graphs:
-            self._pressure.prepare(self.fluid.pressure_cycles)
-            for system in self._diffusion:
-                system.prepare(self.fluid.diffusion_cycles)
             stages = self._stages(state_in, state_out, controls, diffuses)
             graphs = [[self._capture(work) for work in stage] for stage in stages]
             self._graphs[key] = (graphs, state_in, state_out)
@@ -133,15 +132,12 @@ class Solver:
 
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
-        pressure = self._pressure.measure(self._minus_div, self._q, self._iterations("pressure"))
-        self._pressure.levels[0].residual(self._minus_div, self._q, self._pressure.left)
+        pressure = self._pressure.measure(self._solve_pressure, self._minus_div, self._q)
         divergence = norm(self._pressure.left, self.layout)[1]
-        if self.fluid.viscosity > 0:
-            diffusion = self._diffusion[0].measure(
-                self._change[0], self._answer[0], self._iterations("diffusion")
-            )
+        if self._solve_diffusion.iterations:
+            diffusion = self._diffusion[0].measure(self._solve_diffusion, self._change[0], self._answer[0])
         else:
-            diffusion = Residual(0, 0.0, 0.0)
+            diffusion = Residual("none", 0, 0.0, 0.0)
         return SolveReport(pressure, diffusion, divergence)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
@@ -153,8 +149,7 @@ class Solver:
 
     def diffuse(self, state_in: State, state_out: State, dt: float) -> None:
         """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
-        for system in self._diffusion:
-            system.set_coefficients(1.0, dt * self.fluid.viscosity)
+        self._plan_diffusion(dt)
         for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
             self._diffuse(axis, f)
             wp.copy(out, self._diffused[axis])
@@ -163,9 +158,15 @@ class Solver:
         """Only project the velocity; the map of `state_out` is untouched."""
         self._project((state_in.u, state_in.v), state_out)
 
-    def _iterations(self, solve: str) -> int:
-        multigrid = self.fluid.solver == "multigrid"
-        return getattr(self.fluid, f"{solve}_cycles") if multigrid else self.fluid.sweeps
+    def _how(self, wanted: Solve) -> Solve:
+        """The solve wanted, or the paper's."""
+        return wanted if self.fluid.solver == "multigrid" else Solve("jacobi", self.fluid.sweeps)
+
+    def _plan_diffusion(self, dt: float) -> None:
+        for system in self._diffusion:
+            system.set_coefficients(1.0, dt * self.fluid.viscosity)
+            self._solve_diffusion = self._how(system.plan(self.fluid.diffusion_tolerance))
+            system.prepare(self._solve_diffusion)
 
     def _stages(
         self, state_in: State, state_out: State, controls: _Controls, diffuses: bool
@@ -238,7 +239,7 @@ class Solver:
         """
         system, change, answer = self._diffusion[axis], self._change[axis], self._answer[axis]
         system.levels[0].residual(f, f, change)
-        self._solve(system, change, answer, self.fluid.diffusion_cycles)
+        system.solve(self._solve_diffusion, change, answer)
         inputs, out = [f, answer, self._one], self._diffused[axis]
         relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
         self._velocity_ghosts[axis].fill(out)
@@ -248,17 +249,11 @@ class Solver:
         pitch = self.layout.pitch
         inputs = [*velocity, x, y, pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, [self._minus_div])
-        self._solve(self._pressure, self._minus_div, self._q, self.fluid.pressure_cycles)
+        self._pressure.solve(self._solve_pressure, self._minus_div, self._q)
         inputs = [*velocity, self._q, x, y, pitch]
         projection.subtract_gradient.launch(self.layout, self.device, inputs, [state_out.u, state_out.v])
         for f, ghosts in zip((state_out.u, state_out.v), self._velocity_ghosts, strict=True):
             ghosts.fill(f)
-
-    def _solve(self, system: LinearSystem, b: wp.array, x: wp.array, cycles: int) -> None:
-        if self.fluid.solver == "multigrid":
-            system.multigrid(b, x, cycles)
-        else:
-            system.jacobi(b, x, self.fluid.sweeps)
 
 
 class _Controls:

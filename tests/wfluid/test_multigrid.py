@@ -5,7 +5,7 @@ import pytest
 from oracles import laplacian_2d, sparse_laplacian
 
 from wfluid.grid import Grid
-from wfluid.multigrid import LinearSystem, Points, chebyshev_factors
+from wfluid.multigrid import SWEEP_LIMIT, LinearSystem, Points, Solve, chebyshev_count, chebyshev_factors
 from wfluid.state import field, from_numpy, to_numpy
 from wfluid.walls import Rule
 
@@ -38,15 +38,13 @@ def right_hand_side(kind, grid, cut, seed=0):
     return b
 
 
-def solve(system, b, cycles=None, sweeps=None):
+def solve(system, b, cycles=None, sweeps=None, how=None):
+    how = how or (Solve("jacobi", sweeps) if sweeps else Solve("multigrid", cycles))
     layout = system.levels[0].layout
     rhs, x = field(layout, system.device), field(layout, system.device)
     from_numpy(b, rhs, layout)
-    if sweeps:
-        system.jacobi(rhs, x, sweeps)
-    else:
-        system.multigrid(rhs, x, cycles)
-    return to_numpy(x, layout), system.measure(rhs, x, sweeps or cycles)
+    system.solve(how, rhs, x)
+    return to_numpy(x, layout), system.measure(how, rhs, x)
 
 
 @pytest.mark.float64
@@ -92,6 +90,36 @@ def test_three_cycles_leave_less_than_a_thousandth(device, kind):
     b = right_hand_side(kind, grid, cut)
     assert solve(system, b, cycles=3)[1].relative < 1e-3
     assert solve(system, b, cycles=1)[1].relative > 1e-3
+
+
+@pytest.mark.float64
+@pytest.mark.parametrize("scale", [0.0, 1e-6, 1e-4, 5e-4, 2e-3, 0.1, 30.0])
+@pytest.mark.parametrize("tolerance", [0.1, 7e-3, 1e-4])
+def test_a_planned_solve_keeps_its_tolerance_and_is_symmetric(device, scale, tolerance):
+    """On white noise, for every stiffness: few Chebyshev sweeps where that is enough, cycles beyond."""
+    kind = "v no-slip"
+    system, grid, cut = system_for(kind, 41, 32, device)
+    system.set_coefficients(1.0, scale)
+    how = system.plan(tolerance)
+    system.prepare(how)
+    p, q = (right_hand_side(kind, grid, cut, seed) for seed in (1, 2))
+    (mp, residual), (mq, _) = solve(system, p, how=how), solve(system, q, how=how)
+    assert residual.relative <= tolerance
+    if scale == 0:
+        assert how == Solve("chebyshev", 1) and residual.relative < 1e-15
+    size = np.linalg.norm(p) * np.linalg.norm(mq)
+    assert abs(np.sum(p * mq) - np.sum(q * mp)) < 1e-12 * size
+
+
+def test_the_chebyshev_degree_is_the_least_that_keeps_the_tolerance():
+    for low, high, tolerance in ((0.1, 1.9, 7e-3), (0.5, 1.5, 1e-4), (0.8, 1.0, 7e-3)):
+        count = chebyshev_count(low, high, tolerance)
+        x = np.linspace(low, high, 401)
+        left = [
+            np.abs(np.prod([1 - w * x for w in chebyshev_factors(low, high, n)], axis=0)).max()
+            for n in (count - 1, count)
+        ]
+        assert left[1] <= tolerance < left[0]
 
 
 def test_jacobi_is_the_fixed_point_iteration(device):
