@@ -177,7 +177,7 @@ class Animation:
             edge=self.edge,
         )
         now, after = solver.rest(), solver.rest()
-        solve = None
+        solve, warned = None, False
         for index in range(timeline.frames):
             start = clock()
             if index:
@@ -185,7 +185,8 @@ class Animation:
                     solver.step(now, after, self.forces, step * timeline.dt, timeline.dt)
                     now, after = after, now
                 solve = solver.report()
-                _judge(solve, self.fluid, index)
+                if not warned:
+                    warned = _judge(solve, self.fluid, index)
             quality = measure_map(now, self.fluid.walls)
             warp = CoordinateMap.of_state(now, self.fluid.walls)
             simulated = clock()
@@ -215,17 +216,19 @@ def animate(
     return Animation(picture, fluid, tuple(forces), timeline, **settings).frames()
 
 
-def _judge(solve: SolveReport, fluid: Fluid, index: int) -> None:
-    left = solve.pressure.relative
-    if left > POOR_RESIDUAL and solve.pressure.norm_b > 0:
-        remedy = (
-            f"use pressure_cycles={fluid.pressure_cycles + 2}"
-            if fluid.solver == "multigrid"
-            else 'use solver="multigrid"'
-        )
-        warnings.warn(
-            f"frame {index}: the projection left {left:.1e} of the divergence after "
-            f"{solve.pressure.iterations} {'cycles' if fluid.solver == 'multigrid' else 'sweeps'}; {remedy}",
-            PoorSolveWarning,
-            stacklevel=3,
-        )
+def _judge(solve: SolveReport, fluid: Fluid, index: int) -> bool:
+    """Warn of a projection that left too much, with the remedy; returns whether it did."""
+    pressure = solve.pressure
+    if pressure.relative <= POOR_RESIDUAL:
+        return False
+    if pressure.method == "multigrid":
+        done, remedy = "cycles", f"use pressure_cycles={fluid.pressure_cycles + 2}"
+    else:
+        done, remedy = "sweeps", 'use solver="multigrid"'
+    warnings.warn(
+        f"frame {index}: the projection left {pressure.relative:.1e} of the divergence after "
+        f"{pressure.iterations} {done}; {remedy} (said once)",
+        PoorSolveWarning,
+        stacklevel=3,
+    )
+    return True

@@ -7,7 +7,7 @@ and after in opposite order and a restriction that is the prolongation's transpo
 linear operator: its adjoint is itself, converged or not. So is a fixed polynomial of the operator,
 which is what sweeps are.
 
-Coarsening n -> ceil(n/2) per axis until at most `DENSE` unknowns are left, which a stored inverse
+Coarsening n -> ceil(n/2) per axis (the finer one alone where cells are not square) until at most `DENSE` unknowns are left, which a stored inverse
 solves exactly. W. Briggs, V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
 """
 
@@ -192,7 +192,7 @@ class LinearSystem:
         self.levels = [Level(nx, ny, points, device)]
         self.transfers: list[Transfer] = []
         while nx * ny > DENSE:
-            nx, ny = (n if n <= 2 else -(-n // 2) for n in (nx, ny))
+            nx, ny = _coarser(nx, ny, points.size)
             self.levels.append(Level(nx, ny, points, device))
             self.transfers.append(Transfer(*self.levels[-2:], device))
         top = self.levels[0].layout
@@ -326,6 +326,17 @@ def norm(f: wp.array, layout: Layout) -> tuple[float, float]:
     squares, largest = (wp.empty(layout.ny, dtype=Real, device=f.device) for _ in range(2))
     measure.row_norms.launch(layout.ny, f.device, [f, layout.nx, layout.pitch], [squares, largest])
     return float(np.sqrt(squares.numpy().sum(dtype=np.float64))), float(largest.numpy().max())
+
+
+def _coarser(nx: int, ny: int, size: tuple[float, float]) -> tuple[int, int]:
+    """Cells of the next coarser grid: each axis halved, but first the one with much finer cells alone.
+
+    Point smoothers damp only what varies along the finer axis when cells are far from square.
+    """
+    hx, hy = size[0] / nx, size[1] / ny
+    halve_x = nx > 2 and (hx < 1.5 * hy or ny <= 2)
+    halve_y = ny > 2 and (hy < 1.5 * hx or nx <= 2)
+    return -(-nx // 2) if halve_x else nx, -(-ny // 2) if halve_y else ny
 
 
 def _shape(level: Level) -> tuple[int, int]:
