@@ -7,8 +7,9 @@ and after in opposite order and a restriction that is the prolongation's transpo
 linear operator: its adjoint is itself, converged or not. So is a fixed polynomial of the operator,
 which is what sweeps are.
 
-Coarsening n -> ceil(n/2) per axis (the finer one alone where cells are not square) until at most `DENSE` unknowns are left, which a stored inverse
-solves exactly. W. Briggs, V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
+Coarsening n -> ceil(n/2) per axis (the finer one alone where cells are not square) until at most
+`DENSE` unknowns are left, which a stored inverse solves exactly. W. Briggs, V. Henson, S. McCormick,
+A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
 """
 
 from __future__ import annotations
