@@ -1,7 +1,7 @@
 """The raccoon moves its nose and mouth: oscillating forces on one picture.
 
 Figures 5 and 6 of "Control Methods for Fluid-Based Image Warping" (Bonilla & Velho): a diagonal
-oscillator on the nose and one on the mouth, half a period behind it, animate a single photograph.
+oscillator on the nose and one on the mouth, a quarter of a period behind it, animate a single photograph.
 
     python examples/oscillator.py --output raccoon.gif
 """
@@ -51,7 +51,7 @@ def check(frames):
     frames = list(frames)
     side = max(frames[0].picture.width, frames[0].picture.height)
     grid = frames[0].map.grid
-    row, column = round(451 / 1024 / grid.hy), round(621 / 1024 / grid.hx)
+    row, column = int(451 / 1024 / grid.hy), int(621 / 1024 / grid.hx)
     # source_of looks back: the nose has moved to where the displacement is minus the way it went
     way = -1024 * np.array([frame.map.displacement[row, column] for frame in frames])
     along = way @ (22, 15) / AMPLITUDE
@@ -91,7 +91,7 @@ def main():
 
     written = write_animation(options.output, kept(), fps=15.0)
     print(f"{written[-1]}: {len(seen)} frames")
-    if options.frames > 30:
+    if options.frames > 15 and (options.frames - 1) % 15 == 0:
         print(check(seen))
     return 0
 

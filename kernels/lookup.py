@@ -251,3 +251,50 @@ def look_up_cubic(
         out[k] = cubic_inside(picture, (y - 1) * width + x - 1, width, tx, ty)
     else:
         out[k] = cubic_at_edges(picture, x - 1, y - 1, tx, ty, width, height, edge_x, edge_y)
+
+
+PI = wp.constant(Real(3.14159265358979323846))
+
+
+@wp.func
+def lanczos_weight(x: Real):
+    """Sinc(x) sinc(x / 3) for |x| < 3 (Lanczos, three lobes)."""
+    weight = Real(1.0)
+    if wp.abs(x) > Real(1.0e-4):
+        angle = PI * x
+        weight = Real(3.0) * wp.sin(angle) * wp.sin(angle / Real(3.0)) / (angle * angle)
+    return weight
+
+
+@cells
+def look_up_lanczos(
+    i: int,
+    j: int,
+    k: int,
+    picture: Pixels,
+    source_x: Field,
+    source_y: Field,
+    width: int,
+    height: int,
+    edge_x: int,
+    edge_y: int,
+    # outputs
+    out: Pixels,
+):
+    """Lanczos-3 over the thirty-six pixels around the source, weights normalised to one."""
+    k = inside(k)
+    x, tx = whole_and_fraction(source_x[k])
+    y, ty = whole_and_fraction(source_y[k])
+    value = Pixel()
+    total = Real(0.0)
+    for m in range(6):
+        wy = lanczos_weight(Real(m - 2) - ty)
+        line = Pixel()
+        row = Real(0.0)
+        for n in range(6):
+            wx = lanczos_weight(Real(n - 2) - tx)
+            line += wx * pixel(picture, x + n - 2, y + m - 2, width, height, edge_x, edge_y)
+            row += wx
+        value += wy * line
+        total += wy * row
+    out[k] = value / total

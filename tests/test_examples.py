@@ -28,6 +28,20 @@ def test_the_oscillators_check_holds(device):
         example.check(frames[:4])  # a quarter of a period is no swing
 
 
+def test_the_viscosity_check_holds(device):
+    example = load("viscosity")
+    made = [list(a.frames()) for a in example.animations(cells=64, width=96, device=device.alias)]
+    print(example.check(made))
+    assert example.side_by_side([frames[-1] for frames in made]).pixels.shape == (96, 288, 3)
+    with pytest.raises(AssertionError):
+        example.check(made[::-1])
+
+
+def test_any_picture_moves(device):
+    example = load("any_picture")
+    assert example.check(list(example.frames(example.CAT, cells=48, device=device.alias))) > 0.005
+
+
 def test_examples_refuse_unknown_options(tmp_path):
     for path in (ROOT / "examples").glob("*.py"):
         result = subprocess.run(
@@ -37,11 +51,14 @@ def test_examples_refuse_unknown_options(tmp_path):
         assert list(tmp_path.iterdir()) == []
 
 
-def test_an_example_writes_its_animation(tmp_path):
-    command = [sys.executable, str(ROOT / "examples" / "oscillator.py"), "--frames", "3", "--cells", "32"]
-    result = subprocess.run([*command, "--width", "120"], cwd=tmp_path, capture_output=True, text=True)
+@pytest.mark.parametrize("name", ["oscillator", "viscosity", "any_picture"])
+def test_an_example_writes_its_animation(tmp_path, name):
+    command = [sys.executable, str(ROOT / "examples" / f"{name}.py"), "--frames", "3", "--cells", "32"]
+    result = subprocess.run(
+        [*command, "--output", "out.####.png"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert result.returncode == 0, result.stderr
-    assert (tmp_path / "raccoon.gif").stat().st_size > 1000
+    assert len(list(tmp_path.glob("out.100?.png"))) == 3
 
 
 def test_the_readmes_python_runs(tmp_path):

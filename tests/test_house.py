@@ -52,7 +52,7 @@ def test_imports_run_one_way():
 
 
 @pytest.mark.parametrize(
-    ("library", "home"), [("OpenImageIO", {"picture", "output", "report"}), ("av", {"movie"})]
+    ("library", "home"), [("OpenImageIO", {"picture", "output", "preview", "report"}), ("av", {"movie"})]
 )
 def test_heavy_libraries_are_imported_by_their_wrappers_only_and_late(library, home):
     for path in (ROOT / "wfluid").glob("*.py"):

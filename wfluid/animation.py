@@ -14,12 +14,15 @@ from wfluid.device import open_device
 from wfluid.fluid import Fluid
 from wfluid.forces import GaussianForce
 from wfluid.grid import LEAST_CELLS, Grid
-from wfluid.look_up import LookUp
+from wfluid.look_up import LookUp, check_look_up
 from wfluid.picture import Picture
-from wfluid.solver import Solver, SolveReport
+from wfluid.solver import STEP_LIMIT, Solver, SolveReport
 
 STEPS_PER_SECOND = 96
 """Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
+
+LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
+"""Frame rates that make sense."""
 
 FRAME_LIMIT = 100_000
 """Most frames of one animation."""
@@ -56,16 +59,20 @@ class Timeline:
                 raise ValueError(f"{name} {value}: expected a positive number")
         if self.substeps is not None and not (isinstance(self.substeps, int) and self.substeps >= 1):
             raise ValueError(f"substeps {self.substeps}: expected a whole number from 1 on")
-        if not 1 <= round(self.duration * self.fps) <= FRAME_LIMIT:
+        if not 0.5 <= self.duration * self.fps <= FRAME_LIMIT:
             raise ValueError(
-                f"{self.duration} s at {self.fps} fps is {round(self.duration * self.fps)} frames: "
+                f"{self.duration:g} s at {self.fps:g} fps is {self.duration * self.fps:g} frames: "
                 f"expected 1 … {FRAME_LIMIT}"
             )
+        if not LEAST_FPS <= self.fps <= FPS_LIMIT:
+            raise ValueError(f"fps {self.fps:g}: expected {LEAST_FPS:g} … {FPS_LIMIT:g}")
+        if self.dt > STEP_LIMIT:
+            raise ValueError(f"steps of {self.dt:g} s: expected at most {STEP_LIMIT:g}; use more substeps")
 
     @property
     def frames(self) -> int:
         """Frames shown, both ends included."""
-        return round(self.duration * self.fps) + 1
+        return max(1, round(self.duration * self.fps)) + 1
 
     @property
     def steps_per_frame(self) -> int:
@@ -75,7 +82,11 @@ class Timeline:
     @property
     def dt(self) -> float:
         """Length of a step [s]."""
-        return 1.0 / (self.fps * self.steps_per_frame)
+        return self.time_of(1)
+
+    def time_of(self, step: int) -> float:
+        """When a step begins [s]: the same number as the end of the one before."""
+        return step / (self.fps * self.steps_per_frame)
 
 
 @dataclass(frozen=True)
@@ -143,6 +154,7 @@ class Animation:
             size = getattr(self, name)
             if size is not None and not 1 <= size <= SIZE_LIMIT:
                 raise ValueError(f"{name} {size}: expected 1 … {SIZE_LIMIT} pixels")
+        check_look_up(self.filter, self.edge)
         if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
             raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
 
@@ -179,19 +191,19 @@ class Animation:
         now, after = solver.rest(), solver.rest()
         solve, warned = None, False
         for index in range(timeline.frames):
-            start = clock()
+            began = clock()
             if index:
                 for step in range((index - 1) * timeline.steps_per_frame, index * timeline.steps_per_frame):
-                    solver.step(now, after, self.forces, step * timeline.dt, timeline.dt)
+                    start, end = timeline.time_of(step), timeline.time_of(step + 1)
+                    solver.step(now, after, self.forces, start, timeline.dt, until=end)
                     now, after = after, now
                 solve = solver.report()
-                if not warned:
-                    warned = _judge(solve, self.fluid, index)
+                warned = _judge(solve, self.fluid, index, warned)
             quality = measure_map(now, self.fluid.walls)
             warp = CoordinateMap.of_state(now, self.fluid.walls)
             simulated = clock()
-            picture = look_up.render(now.d_x, now.d_y)
-            self.seconds.simulate += simulated - start
+            picture = look_up.render(now.d_x, now.d_y) if index else look_up.untouched
+            self.seconds.simulate += simulated - began
             self.seconds.lookup += clock() - simulated
             yield Frame(index, index / timeline.fps, picture, warp, quality, solve)
 
@@ -216,19 +228,26 @@ def animate(
     return Animation(picture, fluid, tuple(forces), timeline, **settings).frames()
 
 
-def _judge(solve: SolveReport, fluid: Fluid, index: int) -> bool:
-    """Warn of a projection that left too much, with the remedy; returns whether it did."""
+def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
+    """Stop where the fluid is no longer finite; warn once of a projection that left too much.
+
+    The paper's own scheme is not warned of: few Jacobi sweeps are part of it.
+    """
     pressure = solve.pressure
-    if pressure.relative <= POOR_RESIDUAL:
-        return False
+    if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
+        raise FloatingPointError(
+            f"frame {index}: the velocity is no longer finite; use smaller forces or steps"
+        )
+    if warned or fluid.scheme == "paper" or pressure.relative <= POOR_RESIDUAL:
+        return warned
     if pressure.method == "multigrid":
-        done, remedy = "cycles", f"use pressure_cycles={fluid.pressure_cycles + 2}"
+        done, remedy = "cycles", f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
     else:
-        done, remedy = "sweeps", 'use solver="multigrid"'
+        done, remedy = "sweeps", "set solver (--solver) to multigrid"
     warnings.warn(
         f"frame {index}: the projection left {pressure.relative:.1e} of the divergence after "
         f"{pressure.iterations} {done}; {remedy} (said once)",
         PoorSolveWarning,
-        stacklevel=3,
+        stacklevel=2,
     )
     return True

@@ -1,4 +1,4 @@
-"""The command line: wfluid animate, wfluid warmup.
+"""The command line: wfluid animate, wfluid warmup, wfluid --version.
 
 Exit codes: 0 done, 1 the run failed, 2 bad input (one line on stderr), 130 interrupted.
 """
@@ -6,31 +6,73 @@ Exit codes: 0 done, 1 the run failed, 2 bad input (one line on stderr), 130 inte
 from __future__ import annotations
 
 import argparse
+import difflib
+import math
+import re
 import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import NoReturn
 
 EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
+
+EXAMPLE = "wfluid animate raccoon.jpg -o nose.gif --push 621,451:22,15:period=1,radius=55"
 
 QUEUED_FRAMES = 4
 """Frames that may wait for the disk while the next ones are computed."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Says what is wrong in one line, with the nearest flag or verb that exists."""
+
+    def __init__(self, *arguments, **settings):
+        super().__init__(*arguments, allow_abbrev=False, **settings)
+
+    def parse_known_args(self, args=None, namespace=None):
+        """Parse; an unknown flag is refused here, where the verb's own flags are known."""
+        options, unknown = super().parse_known_args(args, namespace)
+        for word in unknown:
+            flag = word.partition("=")[0]
+            if not flag.startswith("-"):
+                self.error(f"{word!r} is one argument too many")
+            near = difflib.get_close_matches(flag, self._option_string_actions, n=1, cutoff=0.5)
+            self.error(f"there is no flag {flag}" + (f"; did you mean {near[0]}?" if near else ""))
+        return options, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print the message and leave with exit code 2."""
+        wrong = re.match(r"argument VERB: invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if wrong:
+            near = difflib.get_close_matches(wrong[1], re.findall(r"\w+", wrong[2]), n=1)
+            ask = f"did you mean {near[0]}?" if near else f"expected {wrong[2]}"
+            message = f"there is no verb {wrong[1]!r}; {ask}"
         self.exit(EXIT_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+class Version(argparse.Action):
+    """Prints what is installed, and the devices."""
+
+    def __call__(self, parser, *_) -> NoReturn:
+        """Load the libraries only now, when they are asked for."""
+        import warp
+
+        from wfluid.device import open_device
+        from wfluid.report import versions
+
+        open_device()
+        print("\n".join(f"{name} {version}" for name, version in versions().items()))
+        print("devices: " + ", ".join(f"{device.alias} ({device.name})" for device in warp.get_devices()))
+        parser.exit()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; returns the exit code."""
     options = _parser().parse_args(arguments)
-    warnings.simplefilter("always")
+    warnings.simplefilter("ignore")
+    warnings.filterwarnings("always", module="wfluid")
     warnings.showwarning = _show_warning
     from wfluid.picture import PictureError
 
@@ -40,9 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"wfluid {options.verb}: {error}", file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt:
-        print(f"wfluid {options.verb}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except (RuntimeError, OSError, MemoryError) as error:
+    except (RuntimeError, ArithmeticError, OSError, MemoryError) as error:
         print(f"wfluid {options.verb}: failed: {error or type(error).__name__}", file=sys.stderr)
         return EXIT_FAILED
 
@@ -51,18 +92,19 @@ def _parser() -> Parser:
     parser = Parser(
         prog="wfluid", description="Animate, warp and morph pictures by treating them as a fluid."
     )
+    parser.add_argument("--version", action=Version, nargs=0, help="versions of wfluid and what it runs on")
+    parser.epilog = "wfluid VERB --help explains a verb; example: " + EXAMPLE
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=Parser)
     animate = verbs.add_parser(
         "animate",
         help="move a picture with forces",
         description="Move a picture with forces and write the frames.",
-        epilog="example: wfluid animate examples/images/raccoon.jpg -o nose.gif "
-        "--push 621,451:20,12:period=1,radius=60",
+        epilog=f"example: {EXAMPLE}",
     )
     animate.set_defaults(run=run_animate)
     animate.add_argument("picture", metavar="PICTURE", help="the picture to animate")
     animate.add_argument(
-        "-o", "--output", metavar="OUT", required=True, help="x.gif, or a sequence such as x.####.png"
+        "-o", "--output", metavar="OUT", help="x.gif, x.mp4, x.webm, or a sequence such as x.####.png"
     )
     animate.add_argument(
         "--push",
@@ -78,12 +120,21 @@ def _parser() -> Parser:
     number("--walls", default="free-slip", help="free-slip, no-slip, periodic, or two of them as X,Y")
     number("--scheme", default="standard", help="standard, or paper: Euler, bilinear, Jacobi, phase 0")
     number("--solver", default=None, help="multigrid (default) or jacobi")
+    number("--pressure-cycles", type=int, default=3, help="multigrid cycles a projection (3)")
     number("--fps", type=float, default=15.0, help="frames a second (15)")
     number("--duration", type=float, default=2.0, help="length [s] (2)")
     number("--substeps", type=int, default=None, help="steps a frame (so many that dt <= 1/96 s)")
     number("--width", type=int, default=None, help="width of the frames [px] (the picture's)")
-    number("--filter", default="cubic", help="nearest, bilinear or cubic (cubic)")
+    number("--scale", type=float, default=None, help="size of the frames as a factor, instead of --width")
+    number("--filter", default="cubic", help="nearest, bilinear, cubic or lanczos (cubic)")
     number("--edge", default="clamp", help="clamp, mirror, wrap or transparent (clamp)")
+    number("--colorspace", default="auto", help="what the picture's numbers are: auto, srgb, linear (auto)")
+    number("--start", type=int, default=1001, help="number of a sequence's first frame (1001)")
+    number("--type", default=None, help="numbers of a sequence: uint8, uint16, half, float (the picture's)")
+    number("--compression", default=None, help="of EXR (zip, piz, dwaa, …) and TIFF (lzw, zip, …) sequences")
+    number("--quality", type=int, default=None, help="of JPEG and WebP sequences, 1 … 100")
+    number("--preview", metavar="FILE", help="draw the pushes on the picture instead of running")
+    number("--dry-run", action="store_true", help="say what would be computed and written, and stop")
     number("--report", metavar="FILE.json", help="write settings, times and quality figures")
     _common(animate)
     warmup = verbs.add_parser(
@@ -116,41 +167,108 @@ def run_warmup(options: argparse.Namespace) -> int:
 def run_animate(options: argparse.Namespace) -> int:
     """Read the picture, run the animation, write frames and report."""
     from wfluid.animation import Animation, Timeline
+    from wfluid.estimate import check_memory
     from wfluid.fluid import Fluid
-    from wfluid.output import open_output
-    from wfluid.picture import read_picture
+    from wfluid.output import check_folder, names, open_output
+    from wfluid.picture import Encoding, read_picture
     from wfluid.push import Push
     from wfluid.report import Report, write_report
 
     began = time.perf_counter()
     fluid = Fluid(
-        viscosity=options.viscosity, walls=options.walls, scheme=options.scheme, solver=options.solver
+        viscosity=options.viscosity,
+        walls=options.walls,
+        scheme=options.scheme,
+        solver=options.solver,
+        pressure_cycles=options.pressure_cycles,
     )
     timeline = Timeline(options.duration, options.fps, options.substeps)
+    encoding = Encoding(options.type, options.compression, options.quality)
     pushes = [Push.parse(text) for text in options.push]
     if not pushes:
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY")
-    picture = read_picture(options.picture)
+    if options.output is None and not options.preview:
+        raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
+    taken = {Path(options.picture).resolve(): "the picture itself"}
+    for flag, written in (
+        ("-o", options.output),
+        ("--report", options.report),
+        ("--preview", options.preview),
+    ):
+        if written is None:
+            continue
+        check_folder(Path(written))
+        for path in names(Path(written), options.start, timeline.frames):
+            if path in taken:
+                raise ValueError(f"{path}: that is {taken[path]}; write to another name")
+            taken[path] = f"written by {flag}"
+    picture = read_picture(options.picture, options.colorspace)
     forces = [push.force(picture.width, picture.height, timeline.duration, fluid.scheme) for push in pushes]
-    output = open_output(options.output, timeline.fps)
+    width, height = _size(options, picture)
     animation = Animation(
         picture,
         fluid,
         forces,
         timeline,
         cells=options.cells,
-        width=options.width,
-        height=options.width and max(1, round(options.width * picture.height / picture.width)),
+        width=width,
+        height=height,
         filter=options.filter,
         edge=options.edge,
         device=options.device,
     )
+    check_memory(animation)
+    output = open_output(options.output, timeline.fps, options.start, encoding) if options.output else None
+    if options.dry_run:
+        _say_plan(animation, options.output)
+        return 0
+    if options.preview:
+        return _preview(options.preview, picture, pushes)
     _load(animation, options.quiet)
     report = Report(animation)
     writing = _write_frames(animation, output, report, options.quiet)
     if options.report:
         times = {"write": writing, "total": time.perf_counter() - began}
         write_report(options.report, report.as_dict(times))
+    return 0
+
+
+def _size(options: argparse.Namespace, picture) -> tuple[int | None, int | None]:
+    """Width and height of the frames from --width or --scale."""
+    scale = options.scale
+    if options.width is None and scale is None:
+        return None, None
+    if options.width is not None and scale is not None:
+        raise ValueError("--width and --scale both say the size: give one")
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise ValueError(f"scale {scale}: expected a positive number")
+    width = options.width if scale is None else max(1, round(scale * picture.width))
+    return width, max(1, round(width * picture.height / picture.width))
+
+
+def _say_plan(animation, output: str | None) -> None:
+    """Print what a run would take and write."""
+    from wfluid.estimate import estimate
+    from wfluid.files import readable_size
+
+    timeline, grid, guess = animation.timeline, animation.grid, estimate(animation)
+    steps = (timeline.frames - 1) * timeline.steps_per_frame
+    size = animation.width or animation.picture.width, animation.height or animation.picture.height
+    print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")
+    print(f"grid      {grid.nx} x {grid.ny} cells")
+    print(f"steps     {steps} of {timeline.dt:.4g} s, {timeline.steps_per_frame} a frame")
+    print(f"frames    {timeline.frames} of {size[0]} x {size[1]} pixels at {timeline.fps:g} a second")
+    print(f"memory    about {readable_size(guess.memory)}")
+    print(f"time      about {guess.seconds:.1f} s on one core, without compiling and writing")
+    print(f"writes    {output or 'nothing'}")
+
+
+def _preview(path: str, picture, pushes) -> int:
+    """Write the picture with the pushes drawn on it."""
+    from wfluid.picture import write_picture
+    from wfluid.preview import draw_controls
+
+    write_picture(path, draw_controls(picture, pushes))
     return 0
 
 
@@ -191,10 +309,14 @@ def _write_frames(animation, output, report, quiet: bool) -> float:
         start = time.perf_counter()
         output.close()
         return writing + time.perf_counter() - start
+    except KeyboardInterrupt:
+        output.close()  # what is there is whole: a movie ends at its last frame
+        finished = ", ".join(map(str, output.written[:1] + output.written[1:][-1:])) or "nothing"
+        between = " … " if len(output.written) > 2 else ""
+        print(f"interrupted; finished: {finished.replace(', ', between or ', ')}", file=sys.stderr)
+        raise
     except BaseException:
         output.abandon()
-        if output.written:
-            print(f"finished before that: {len(output.written)} files", file=sys.stderr)
         raise
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from wfluid.device import LAUNCHES
 from wfluid.grid import Grid
 from wfluid.kernels import measure
 from wfluid.kernels.cells import Real
@@ -61,7 +62,8 @@ def measure_map(state: State, walls: Walls) -> MapQuality:
     least, greatest, outside = (wp.empty(layout.ny, dtype=Real, device=device) for _ in range(3))
     closed = [int(not periodic) for periodic in walls.periodic]
     inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
-    measure.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
+    with LAUNCHES:
+        measure.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
     length = np.hypot(*state.displacement)
     return MapQuality(
         float(least.numpy().min()),

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-import os
-import sys
+import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import warp as wp
 
+from wfluid.files import quiet_stderr
 from wfluid.kernels.cells import module_of
+
+LAUNCHES = threading.RLock()
+"""Held while graphs are captured or kernels launched one by one: Warp captures what any thread launches."""
+
+
+def capture(device: wp.Device, work: Callable[[], None]) -> wp.Graph:
+    """The launches of `work` as a graph, to be replayed with `wp.capture_launch`."""
+    with LAUNCHES, wp.ScopedCapture(device=device) as captured:
+        work()
+    return captured.graph
 
 
 class DeviceError(ValueError):
@@ -25,7 +34,7 @@ def open_device(name: str | None = None) -> wp.Device:
         DeviceError: no such device here; the message lists what there is.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
-    with _quiet_stderr():
+    with quiet_stderr():
         wp.init()
     try:
         return wp.get_device(name or "cpu")
@@ -50,20 +59,6 @@ def load_kernels(device: wp.Device) -> float:
     if module_of(_kind(device)).load(device, _threads(device)) is None:
         raise RuntimeError(f"the kernels could not be built for {device.alias}")
     return time.perf_counter() - start
-
-
-@contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Drop what native code writes to stderr: Warp warns of a missing CUDA driver on every CPU."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
 
 
 def _kind(device: wp.Device) -> str:

@@ -121,7 +121,7 @@ class Oscillator:
     end: float = math.inf
     """When it ends [s]."""
     centred: bool = True
-    """Whether the first half period has half the amplitude. Meant for phase 0.25."""
+    """Whether the first half period has half the amplitude. Meant for the phases 0.25 and 0.75."""
 
     def __post_init__(self) -> None:
         for name in ("amplitude", "phase", "start"):

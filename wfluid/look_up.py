@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import warp as wp
 
+from wfluid.device import LAUNCHES, capture
 from wfluid.grid import Grid
 from wfluid.kernels import lookup
 from wfluid.kernels.cells import HALO, Layout, Real, whole_spans
@@ -20,10 +21,22 @@ FILTERS = {
     "nearest": lookup.look_up_nearest,
     "bilinear": lookup.look_up_bilinear,
     "cubic": lookup.look_up_cubic,
+    "lanczos": lookup.look_up_lanczos,
 }
 EDGES = {"clamp": 0, "mirror": 1, "wrap": 2, "transparent": 3}
 
 _QUAD = 4
+
+
+def check_look_up(filter: str, edge: str) -> None:
+    """Refuse a filter or an edge that does not exist.
+
+    Raises:
+        ValueError: with those that do.
+    """
+    for name, value, known in (("filter", filter, FILTERS), ("edge", edge, EDGES)):
+        if value not in known:
+            raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
 
 
 class PictureOnDevice:
@@ -69,10 +82,7 @@ class LookUp:
         filter: str = "cubic",
         edge: str = "clamp",
     ):
-        if filter not in FILTERS:
-            raise ValueError(f"filter {filter!r}: expected one of {', '.join(FILTERS)}")
-        if edge not in EDGES:
-            raise ValueError(f"edge {edge!r}: expected one of {', '.join(EDGES)}")
+        check_look_up(filter, edge)
         self.device = device
         self.picture = picture
         self._source = PictureOnDevice(picture, edge == "transparent", device)
@@ -98,9 +108,10 @@ class LookUp:
 
     def launch(self, d_x: wp.array, d_y: wp.array) -> None:
         """Compute the coordinates and pixels of `render`, left in device memory."""
-        for d, ghosts, out in zip((d_x, d_y), self._ghosts, self._stretched, strict=True):
-            lookup.stretch_y.launch(self._strip, self.device, [d, *self._rows, self._grid.pitch], [out])
-            ghosts.fill(out)
+        with LAUNCHES:
+            for d, ghosts, out in zip((d_x, d_y), self._ghosts, self._stretched, strict=True):
+                lookup.stretch_y.launch(self._strip, self.device, [d, *self._rows, self._grid.pitch], [out])
+                ghosts.fill(out)
         if self._pool:
             list(self._pool.map(wp.capture_launch, self._strips))
         else:
@@ -111,8 +122,19 @@ class LookUp:
         self.launch(d_x, d_y)
         quads = [self._to_numpy(out) for out in self._out]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
-        pixels = np.ascontiguousarray(pixels[..., : self._source.channels], dtype=np.float32)
+        pixels = np.array(pixels[..., : self._source.channels], dtype=np.float32, order="C")  # a copy
         return Picture(pixels, self._source.alpha, self.picture.dtype, self.picture.metadata)
+
+    @property
+    def untouched(self) -> Picture:
+        """What a still map shows, to the bit; with the transparent edge it has its alpha."""
+        pixels, alpha = self.picture.pixels, self.picture.alpha
+        if (self.width, self.height) != (self.picture.width, self.picture.height):
+            still = wp.zeros(self._grid.size, dtype=Real, device=self.device)
+            return self.render(still, still)
+        if alpha != self._source.alpha:
+            pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+        return Picture(np.array(pixels), self._source.alpha, self.picture.dtype, self.picture.metadata)
 
     def source_of(self, d_x: wp.array, d_y: wp.array) -> np.ndarray:
         """Where each pixel's colour comes from: (height, width, 2), x and y [px of the source].
@@ -135,9 +157,7 @@ class LookUp:
         return grid[HALO : HALO + self.height, HALO : HALO + self.width]
 
     def _capture(self, rows: tuple[int, int]) -> wp.Graph:
-        with wp.ScopedCapture(device=self.device) as capture:
-            self._look_up((int(rows[0]), int(rows[1])))
-        return capture.graph
+        return capture(self.device, lambda: self._look_up((int(rows[0]), int(rows[1]))))
 
     def _look_up(self, rows: tuple[int, int]) -> None:
         source = self._source

@@ -1,10 +1,11 @@
-"""Animations as files: numbered pictures, and GIF. The name decides."""
+"""Animations as files: numbered pictures, GIF and movies. The name decides."""
 
 from __future__ import annotations
 
 import os
 import re
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
 
@@ -12,10 +13,14 @@ import numpy as np
 
 from wfluid import movie
 from wfluid.animation import Frame
-from wfluid.picture import Picture, PictureError, check_ending, encode, whole_file, write_picture
+from wfluid.files import remove_leftovers, whole_file
+from wfluid.picture import Encoding, Picture, PictureError, encode, write_picture
 
 FIRST_FRAME = 1001
 """Number of the first frame of a sequence (the convention of film work)."""
+
+LONGEST_DELAY = 65535
+"""Longest GIF delay that its two bytes hold [1/100 s]."""
 
 LEAST_DELAY = 2
 """Shortest GIF delay that browsers obey [1/100 s]."""
@@ -40,39 +45,64 @@ class Output(Protocol):
         ...
 
 
-def open_output(path: str | os.PathLike, fps: float, start: int = FIRST_FRAME) -> Output:
-    """The output for a name: `x.gif`, or a sequence `x.####.png`, `x.%04d.exr`.
+def open_output(
+    path: str | os.PathLike, fps: float, start: int = FIRST_FRAME, encoding: Encoding | None = None
+) -> Output:
+    """The output for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
+
+    `start` is the number of a sequence's first frame, `encoding` how its stills are written.
 
     Raises:
-        PictureError: a name that is neither, or a folder that does not exist or cannot be written.
+        PictureError: a name that is none of these, a folder that does not exist or cannot be written, a
+            movie without the extra `video`, or an encoding that the format does not have.
     """
-    path = Path(path)
+    path, encoding = Path(path), encoding or Encoding()
+    check_folder(path)
+    numbered = numbering(path)
+    if numbered is not None:
+        encoding.check(path)
+        if start < 0:
+            raise PictureError(f"first frame {start}: expected 0 or more")
+        return Sequence(path, numbered, start, encoding)
+    ending = path.suffix.lower()
+    if ending == ".gif":
+        return Gif(path, fps)
+    if ending in movie.CODECS:
+        if not movie.available():
+            raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
+        return MovieFile(path, fps)
+    kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
+    raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a file whose folder is not there or cannot be written; clear what killed runs left in it.
+
+    Raises:
+        PictureError: with the reason.
+    """
     if not path.parent.is_dir():
         raise PictureError(f"{path.parent}: no such folder; make it first")
     if not os.access(path.parent, os.W_OK):
         raise PictureError(f"{path.parent}: this folder cannot be written to")
     if path.is_dir():
-        raise PictureError(f"{path}: a folder; name a file, such as {path / 'frame.####.png'}")
-    numbered = numbering(path)
-    if numbered is not None:
-        check_ending(path)
-        return Sequence(path, numbered, start)
-    if path.suffix.lower() == ".gif":
-        return Gif(path, fps)
-    raise PictureError(
-        f"{path}: cannot tell the output's kind; name it x.gif or a sequence such as x.####.png"
-    )
+        raise PictureError(f"{path}: a folder; name a file in it")
+    remove_leftovers(path.parent)
 
 
 def write_animation(
-    path: str | os.PathLike, frames: Iterable[Frame], fps: float = 24.0, start: int = FIRST_FRAME
+    path: str | os.PathLike,
+    frames: Iterable[Frame],
+    fps: float = 24.0,
+    start: int = FIRST_FRAME,
+    encoding: Encoding | None = None,
 ) -> list[Path]:
     """Write frames as they come; returns the files written.
 
     Raises:
         PictureError: see `open_output`; nothing unfinished is left behind.
     """
-    output = open_output(path, fps, start)
+    output = open_output(path, fps, start, encoding)
     try:
         for frame in frames:
             output.write(frame.picture)
@@ -81,6 +111,19 @@ def write_animation(
         output.abandon()
         raise
     return output.written
+
+
+def names(path: Path, start: int, frames: int) -> set[Path]:
+    """Every file that an animation of so many frames writes under a name, resolved."""
+    pattern = numbering(path)
+    if pattern is None:
+        return {path.resolve()}
+    return {_numbered(path, pattern, n).resolve() for n in range(start, start + frames)}
+
+
+def _numbered(path: Path, pattern: str, number: int) -> Path:
+    digits = len(pattern) if pattern[0] == "#" else int(pattern.strip("%d") or 0)
+    return path.with_name(path.name.replace(pattern, str(number).zfill(max(digits, 1))))
 
 
 def numbering(path: Path) -> str | None:
@@ -94,16 +137,14 @@ def numbering(path: Path) -> str | None:
 class Sequence:
     """Numbered stills."""
 
-    def __init__(self, path: Path, pattern: str, start: int):
-        self.path, self.pattern, self.next = path, pattern, start
+    def __init__(self, path: Path, pattern: str, start: int, encoding: Encoding):
+        self.path, self.pattern, self.next, self.encoding = path, pattern, start, encoding
         self.written: list[Path] = []
 
     def write(self, picture: Picture) -> None:
         """Write the next number."""
-        digits = len(self.pattern) if self.pattern[0] == "#" else int(self.pattern.strip("%d") or 0)
-        number = str(self.next).zfill(max(digits, 1))
-        path = self.path.with_name(self.path.name.replace(self.pattern, number))
-        write_picture(path, picture)
+        path = _numbered(self.path, self.pattern, self.next)
+        write_picture(path, picture, self.encoding)
         self.written.append(path)
         self.next += 1
 
@@ -121,23 +162,21 @@ class Gif:
     """
 
     def __init__(self, path: Path, fps: float):
-        if fps > 100 / LEAST_DELAY:
-            raise PictureError(
-                f"{path}: a GIF shows at most {100 // LEAST_DELAY} frames a second, not {fps:g}"
-            )
+        if not 100 / LONGEST_DELAY <= fps <= 100 / LEAST_DELAY:
+            limits = f"{100 / LONGEST_DELAY:.2g} … {100 // LEAST_DELAY}"
+            raise PictureError(f"{path}: a GIF shows {limits} frames a second, not {fps:g}")
         self.path, self.fps = path, fps
         self.written: list[Path] = []
         self._frames: list[np.ndarray] = []
 
     def write(self, picture: Picture) -> None:
         """Keep the frame: the format wants their number first."""
-        stored, _ = encode(picture, "uint8", linear=False, with_alpha=False)
-        if stored.shape[2] < 3:
-            stored = np.repeat(stored[..., :1], 3, axis=2)
-        self._frames.append(np.ascontiguousarray(stored[..., :3]))
+        self._frames.append(display_rgb(picture))
 
     def close(self) -> None:
-        """Write the file."""
+        """Write the file, if there are frames."""
+        if not self._frames:
+            return
         with whole_file(self.path) as temporary:
             if movie.available():
                 movie.write_gif(temporary, self._frames)
@@ -150,6 +189,49 @@ class Gif:
 
     def abandon(self) -> None:
         """Nothing is on the disk before `close`."""
+
+
+class MovieFile:
+    """MP4 or WebM, encoded as the frames come."""
+
+    def __init__(self, path: Path, fps: float):
+        self.path, self.fps = path, fps
+        self.written: list[Path] = []
+        self._stack = ExitStack()
+        self._movie: movie.Movie | None = None
+
+    def write(self, picture: Picture) -> None:
+        """Encode the next frame."""
+        frame = display_rgb(picture)
+        if self._movie is None:
+            temporary = self._stack.enter_context(whole_file(self.path))
+            self._movie = movie.Movie(
+                temporary, self.path.suffix.lower(), frame.shape[1], frame.shape[0], self.fps
+            )
+        self._movie.write(frame)
+
+    def close(self) -> None:
+        """Finish the file, if there are frames, and give it its name."""
+        if self._movie is not None:
+            self._movie.close()
+            self._stack.close()
+            self.written.append(self.path)
+            self._movie = None
+
+    def abandon(self) -> None:
+        """Remove what is unfinished."""
+        if self._movie is not None:
+            self._movie.abandon()
+            self._stack.pop_all().__exit__(RuntimeError, RuntimeError(), None)
+            self._movie = None
+
+
+def display_rgb(picture: Picture) -> np.ndarray:
+    """A picture as 8-bit sRGB (height, width, 3), over black where it is transparent; grey is repeated."""
+    stored, _ = encode(picture, "uint8", linear=False, channels=3)
+    if stored.shape[2] < 3:
+        stored = np.repeat(stored[..., :1], 3, axis=2)
+    return np.ascontiguousarray(stored)
 
 
 def _write_gif(path: Path, frames: list[np.ndarray]) -> None:

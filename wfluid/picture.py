@@ -10,9 +10,18 @@ from typing import Any
 import numpy as np
 
 from wfluid import colour
+from wfluid.files import free_memory, quiet_stderr, readable_size, whole_file
 
-DTYPES = ("uint8", "uint16", "half", "float")
+COLORSPACES = ("auto", "srgb", "linear")
+
+TYPES = ("uint8", "uint16", "half", "float")
 """Number types a picture is written with."""
+
+LARGEST = 65504.0
+"""What an infinite value becomes on reading (the largest half): filters would spread it as NaN."""
+
+SIDE_LIMIT = 65_535
+"""Longest side of a picture [px]: what most formats, and 32-bit indices, allow."""
 
 _NUMPY = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
 _WRITES = {
@@ -30,14 +39,80 @@ _WRITES = {
 }
 """Formats written as stills, and the number types of each, the first one being the default."""
 
+_CHANNELS = {".jpg": 3, ".jpeg": 3, ".hdr": 3, ".bmp": 3, ".png": 4, ".webp": 4, ".tga": 4, ".dpx": 4}
+"""Most channels that a format holds, where that is few; with 3 there is no alpha among them."""
+
+_COMPRESSIONS = {
+    ".exr": ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"),
+    ".tif": ("none", "lzw", "zip", "packbits"),
+    ".tiff": ("none", "lzw", "zip", "packbits"),
+}
+_QUALITIES = {".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp"}
+
 _LINEAR = ("half", "float")
 """Number types that hold linear light; the others hold sRGB."""
 
-_WITHOUT_ALPHA = (".jpg", ".jpeg", ".hdr", ".bmp")
+_NOT_KEPT = ("oiio:UnassociatedAlpha", "oiio:ColorSpace", "compression", "CompressionQuality", "Orientation")
+
+_UPRIGHT = {
+    1: lambda a: a,
+    2: lambda a: a[:, ::-1],
+    3: lambda a: a[::-1, ::-1],
+    4: lambda a: a[::-1],
+    5: lambda a: a.swapaxes(0, 1),
+    6: lambda a: a.swapaxes(0, 1)[:, ::-1],
+    7: lambda a: a.swapaxes(0, 1)[::-1, ::-1],
+    8: lambda a: a.swapaxes(0, 1)[::-1],
+}
+"""By EXIF orientation (EXIF 2.32, tag 0x0112): the stored array turned upright."""
 
 
 class PictureError(ValueError):
     """A picture that cannot be read or written; the message says which, why and what to do."""
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How a still is written; what is None follows the picture and the format.
+
+    Raises:
+        PictureError: a value that no format has.
+    """
+
+    type: str | None = None
+    """Number type: one of `TYPES`."""
+    compression: str | None = None
+    """Lossless or lossy method, for EXR and TIFF."""
+    quality: int | None = None
+    """1 … 100, for JPEG and WebP."""
+
+    def __post_init__(self) -> None:
+        if self.type is not None and self.type not in TYPES:
+            raise PictureError(f"type {self.type!r}: expected one of {', '.join(TYPES)}")
+        known = sorted({name for names in _COMPRESSIONS.values() for name in names})
+        if self.compression is not None and self.compression not in known:
+            raise PictureError(f"compression {self.compression!r}: expected one of {', '.join(known)}")
+        if self.quality is not None and not 1 <= self.quality <= 100:
+            raise PictureError(f"quality {self.quality}: expected 1 … 100")
+
+    def check(self, path: Path) -> None:
+        """Refuse what the format of `path` does not have.
+
+        Raises:
+            PictureError: an unknown ending, or a setting its format lacks, with what it has.
+        """
+        ending = path.suffix.lower()
+        if ending not in _WRITES:
+            raise PictureError(f"{path}: unknown picture format {path.suffix!r}; known: {', '.join(_WRITES)}")
+        if self.type is not None and self.type not in _WRITES[ending]:
+            raise PictureError(f"{path}: {ending} holds {' or '.join(_WRITES[ending])}, not {self.type}")
+        if self.compression is not None and self.compression not in _COMPRESSIONS.get(ending, ()):
+            known = ", ".join(_COMPRESSIONS.get(ending, ())) or "no choice of compression"
+            raise PictureError(
+                f"{path}: compression {self.compression!r} is not for {ending}: it has {known}"
+            )
+        if self.quality is not None and ending not in _QUALITIES:
+            raise PictureError(f"{path}: {ending} has no quality; {', '.join(_QUALITIES)} have")
 
 
 @dataclass(frozen=True)
@@ -49,7 +124,7 @@ class Picture:
     alpha: int | None = None
     """Index of the alpha channel."""
     dtype: str = "float"
-    """Number type of the file it came from: one of `DTYPES`."""
+    """Number type of the file it came from: one of `TYPES`."""
     metadata: Any = None
     """The OpenImageIO `ImageSpec` it came with, for writing."""
 
@@ -81,78 +156,86 @@ class Picture:
         return replace(self, pixels=pixels)
 
 
-def read_picture(path: str | os.PathLike) -> Picture:
-    """Read a still: 8-bit, 16-bit, half or float, 1 to 4 channels or more.
+def read_picture(path: str | os.PathLike, colorspace: str = "auto") -> Picture:
+    """Read a still in any format that OpenImageIO reads; of several in one file, the first.
 
-    Integers are taken as sRGB and linearised; EXR, HDR and other floats are linear. Unassociated alpha
-    is linearised first and multiplied in after.
+    `colorspace` says what the numbers are: "srgb", "linear", or "auto": sRGB for integers, linear for
+    half and float. Alpha is never linearised; where it is unassociated it multiplies the colours once
+    they are linear. The picture is turned upright by its EXIF orientation.
 
     Raises:
-        PictureError: no such file, or one that OpenImageIO cannot read.
+        PictureError: no such file, one that cannot be read, is damaged, or is too large for the memory.
     """
     import OpenImageIO as oiio
 
     path = Path(path)
+    if colorspace not in COLORSPACES:
+        raise PictureError(f"colorspace {colorspace!r}: expected one of {', '.join(COLORSPACES)}")
     if not path.is_file():
-        raise PictureError(f"{path}: no such picture" if not path.exists() else f"{path}: not a file")
+        why = "is a folder, not a picture" if path.is_dir() else "no such picture"
+        raise PictureError(f"{path}: {why}")
+    if path.stat().st_size == 0:
+        raise PictureError(f"{path}: the file is empty")
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(str(path), hints)
-    if source is None:
-        raise PictureError(f"{path}: not a picture that can be read ({_first_line(oiio.geterror())})")
-    try:
-        spec = source.spec()
-        dtype = _dtype_of(str(spec.format))
-        stored = source.read_image(0, 0, 0, spec.nchannels, "half" if dtype == "half" else _NUMPY[dtype])
-        if stored is None:
-            raise PictureError(f"{path}: damaged ({_first_line(source.geterror())})")
-    finally:
-        source.close()
-    if str(spec.format) == "half":
+    with quiet_stderr():
+        source = oiio.ImageInput.open(str(path), hints)
+        if source is None:
+            raise PictureError(f"{path}: not a picture that can be read ({_first_line(_message(oiio))})")
+        try:
+            spec = source.spec()
+            _check_size(path, spec)
+            dtype = _type_of(str(spec.format))
+            stored = source.read_image(0, 0, 0, spec.nchannels, dtype)
+            message = _message(source)
+        finally:
+            source.close()
+    if stored is None or message:
+        raise PictureError(f"{path}: damaged or cut off ({_first_line(message)})")
+    stored = np.asarray(stored).reshape(spec.height, spec.width, spec.nchannels)
+    if dtype == "half":
         stored = stored.view(np.float16) if stored.dtype != np.float16 else stored
-    stored = stored.reshape(spec.height, spec.width, spec.nchannels)
-    alpha = spec.alpha_channel if spec.alpha_channel >= 0 else None
-    srgb = stored.dtype.kind == "u"
+    alpha = spec.alpha_channel if 0 <= spec.alpha_channel < spec.nchannels else None
+    srgb = colorspace == "srgb" or (colorspace == "auto" and dtype not in _LINEAR)
     pixels = np.empty(stored.shape, dtype=np.float32)
     for channel in range(spec.nchannels):
         pixels[..., channel] = colour.decode(stored[..., channel], srgb and channel != alpha)
     if alpha is not None and spec.get_int_attribute("oiio:UnassociatedAlpha"):
         colours = [channel for channel in range(spec.nchannels) if channel != alpha]
         pixels[..., colours] *= pixels[..., [alpha]]
-    return Picture(pixels, alpha, dtype, spec)
+    pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
+    upright = _UPRIGHT.get(spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
+    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec)
 
 
-def write_picture(path: str | os.PathLike, picture: Picture) -> None:
+def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
     """Write a still in the format that the name's ending says, whole or not at all.
 
-    The number type is the picture's own where the format has it, else the format's default; alpha is
-    dropped (over black) where the format has none.
+    The number type is the picture's own where the format has it, else the format's default. Alpha and
+    further channels are dropped where the format has no room (alpha over black). Metadata travel, and
+    windows where the size is still the source's.
 
     Raises:
-        PictureError: unknown ending, or the file cannot be written.
+        PictureError: a format or setting that does not exist, or the file cannot be written.
     """
     import OpenImageIO as oiio
 
-    path = Path(path)
+    path, encoding = Path(path), encoding or Encoding()
+    encoding.check(path)
     ending = path.suffix.lower()
-    check_ending(path)
-    dtype = picture.dtype if picture.dtype in _WRITES[ending] else _WRITES[ending][0]
+    own = picture.dtype if picture.dtype in _WRITES[ending] else _WRITES[ending][0]
+    dtype = encoding.type or own
     linear = dtype in _LINEAR
-    stored, alpha = encode(picture, dtype, linear, ending not in _WITHOUT_ALPHA)
-    spec = oiio.ImageSpec(picture.metadata) if picture.metadata is not None else oiio.ImageSpec()
-    spec.width, spec.height, spec.depth = picture.width, picture.height, 1
-    spec.full_width, spec.full_height = picture.width, picture.height
-    spec.x = spec.y = spec.full_x = spec.full_y = 0
-    spec.tile_width = spec.tile_height = spec.tile_depth = 0
-    spec.nchannels = stored.shape[2]
-    spec.default_channel_names()
-    spec.set_format(oiio.TypeDesc(dtype))
+    stored, alpha = encode(picture, dtype, linear, _CHANNELS.get(ending, 1024))
+    spec = _spec_for(picture, stored.shape, dtype)
     spec.alpha_channel = -1 if alpha is None else alpha
-    for name in ("oiio:UnassociatedAlpha", "oiio:ColorSpace", "compression"):
-        spec.erase_attribute(name)
     if alpha is not None and not linear:
         spec.attribute("oiio:UnassociatedAlpha", 1)
-    with whole_file(path) as temporary:
+    if encoding.compression is not None:
+        spec.attribute("compression", encoding.compression)
+    if encoding.quality is not None:
+        spec.attribute("compression", f"{_QUALITIES[ending]}:{encoding.quality}")
+    with whole_file(path) as temporary, quiet_stderr():
         out = oiio.ImageOutput.create(str(temporary))
         if out is None:
             raise PictureError(f"{path}: cannot be written ({_first_line(oiio.geterror())})")
@@ -162,14 +245,18 @@ def write_picture(path: str | os.PathLike, picture: Picture) -> None:
             raise PictureError(f"{path}: cannot be written ({_first_line(message or out.geterror())})")
 
 
-def encode(picture: Picture, dtype: str, linear: bool, with_alpha: bool) -> tuple[np.ndarray, int | None]:
-    """A picture's numbers as a file stores them, and which channel is alpha.
+def encode(picture: Picture, dtype: str, linear: bool, channels: int) -> tuple[np.ndarray, int | None]:
+    """A picture's numbers as a file of at most `channels` channels stores them, and which is alpha.
 
-    In linear files alpha stays premultiplied; in display files it is divided out first.
+    With up to three channels there is no alpha. In linear files it stays premultiplied; in display files
+    it is divided out first.
     """
     pixels, alpha = picture.pixels, picture.alpha
-    if alpha is not None and not with_alpha:
+    if alpha is not None and channels <= 3:
         pixels, alpha = np.delete(pixels, alpha, axis=2), None
+    pixels = pixels[..., :channels] if alpha is None or alpha < channels else pixels[..., :3]
+    if channels == 3 and pixels.shape[2] == 2:
+        pixels = pixels[..., :1]
     kind = _NUMPY[dtype]
     if linear or alpha is None:
         return colour.encode(pixels, kind, srgb=not linear), alpha
@@ -180,37 +267,57 @@ def encode(picture: Picture, dtype: str, linear: bool, with_alpha: bool) -> tupl
     return stored, alpha
 
 
-def check_ending(path: Path) -> None:
-    """Refuse a name whose ending is no still format.
+def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):
+    """The picture's own spec where it has one, made to fit."""
+    import OpenImageIO as oiio
 
-    Raises:
-        PictureError: with the list of endings.
-    """
-    if path.suffix.lower() not in _WRITES:
-        raise PictureError(f"{path}: unknown picture format {path.suffix!r}; known: {', '.join(_WRITES)}")
-
-
-class whole_file:
-    """A temporary name in the same folder, renamed to `path` on success and removed on failure."""
-
-    def __init__(self, path: Path):
-        self.path = path
-        self.temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
-
-    def __enter__(self) -> Path:
-        return self.temporary
-
-    def __exit__(self, kind, error, trace) -> None:
-        if kind is None:
-            os.replace(self.temporary, self.path)
-        else:
-            self.temporary.unlink(missing_ok=True)
+    height, width, channels = shape
+    spec = oiio.ImageSpec(picture.metadata) if picture.metadata is not None else oiio.ImageSpec()
+    names = spec.channelnames
+    upright = spec.get_int_attribute("Orientation", 1) == 1
+    if (spec.width, spec.height) != (width, height) or not upright:
+        spec.x = spec.y = spec.full_x = spec.full_y = 0
+        spec.full_width, spec.full_height = width, height
+    spec.width, spec.height, spec.depth = width, height, 1
+    spec.tile_width = spec.tile_height = spec.tile_depth = 0
+    spec.nchannels = channels
+    spec.channelformats = ()
+    spec.default_channel_names()
+    if len(names) == channels:
+        spec.channelnames = names
+    spec.set_format(oiio.TypeDesc(dtype))
+    for name in _NOT_KEPT:
+        spec.erase_attribute(name)
+    return spec
 
 
-def _dtype_of(format_name: str) -> str:
-    if format_name in DTYPES:
+def _check_size(path: Path, spec) -> None:
+    """Refuse dimensions that no memory holds, before any is taken."""
+    if not (1 <= spec.width <= SIDE_LIMIT and 1 <= spec.height <= SIDE_LIMIT and spec.depth == 1):
+        size = f"{spec.width} x {spec.height} x {spec.depth}"
+        raise PictureError(f"{path}: {size} pixels; sides of 1 … {SIDE_LIMIT} can be read")
+    need, there = 12 * spec.width * spec.height * max(spec.nchannels, 1), free_memory()
+    if need > there:
+        raise PictureError(
+            f"{path}: {spec.width} x {spec.height} pixels need about {readable_size(need)} of memory, "
+            f"{readable_size(there)} are free; make the picture smaller first"
+        )
+
+
+def _type_of(format_name: str) -> str:
+    if format_name in TYPES:
         return format_name
-    return {"double": "float", "int8": "uint8", "int16": "uint16"}.get(format_name, "uint16")
+    return {"double": "float", "int8": "uint8", "uint32": "float", "int32": "float"}.get(
+        format_name, "uint16"
+    )
+
+
+def _message(library) -> str:
+    """OpenImageIO's message; it may quote bytes of a damaged file that are no text."""
+    try:
+        return library.geterror()
+    except UnicodeDecodeError:
+        return "the file's structure makes no sense"
 
 
 def _first_line(message: str) -> str:

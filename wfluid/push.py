@@ -19,6 +19,9 @@ KEYS = ("radius", "period", "phase", "start", "end", "at", "strength")
 DEFAULT_RADIUS = 0.06
 """Radius of a push that names none [longer side]."""
 
+LEAST_TIME = 0.001
+"""Shortest period or window of a push [s]; a blow (`at`) has none."""
+
 _PRESSURE = 2.0
 
 
@@ -67,9 +70,10 @@ class Push:
             raise ValueError(f"push {text!r}: at= is one blow; it goes with radius and strength only")
         if "phase" in given and "period" not in given:
             raise ValueError(f"push {text!r}: phase= needs period=")
-        for key in ("radius", "period"):
-            if key in given and given[key] <= 0:
-                raise ValueError(f"push {text!r}: {key} {given[key]:g} is not positive")
+        if given.get("radius", 1.0) <= 0:
+            raise ValueError(f"push {text!r}: radius {given['radius']:g} is not positive")
+        if given.get("period", 1.0) < LEAST_TIME:
+            raise ValueError(f"push {text!r}: period {given['period']:g}: expected {LEAST_TIME} s or more")
         for key in ("start", "at"):
             if given.get(key, 0) < 0:
                 raise ValueError(f"push {text!r}: {key} {given[key]:g} is before the animation")
@@ -105,13 +109,17 @@ class Push:
                 raise ValueError(f"push at={at:g}: the animation lasts {duration:g} s")
             return Instantaneous(at), 1.0 / (duration - at)
         start, end = given.get("start", 0.0), given.get("end", duration)
+        if end - start < LEAST_TIME and start < duration:
+            raise ValueError(
+                f"push from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; at= is a blow"
+            )
         if start >= duration:
             raise ValueError(f"push start={start:g}: the animation lasts {duration:g} s")
         if "period" not in given:
             return Constant(start, end), 2.0 / (end - start) ** 2
         paper = scheme == "paper"
         phase = given.get("phase", 0.0 if paper else 0.25)
-        centred = not paper and math.isclose(phase % 1.0, 0.25)
+        centred = not paper and math.isclose(phase % 0.5, 0.25)
         period = given["period"]
         envelope = Oscillator(period=period, phase=phase, start=start, end=end, centred=centred)
         return envelope, (2 * math.pi / period) ** 2

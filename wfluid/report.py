@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from wfluid.animation import Animation, Frame
-from wfluid.picture import PictureError, whole_file
+from wfluid.files import whole_file
+from wfluid.picture import PictureError
 
 
 @dataclass
@@ -55,12 +56,6 @@ class Report:
 
     def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
         """The report; `seconds` adds the times that the animation does not know."""
-        import numpy
-        import OpenImageIO
-        import warp
-
-        from wfluid import __version__
-
         animation, fluid = self.animation, self.animation.fluid
         times = animation.seconds
         return {
@@ -87,13 +82,24 @@ class Report:
             **self.extremes,
             "pressure_residual_max": self.residual_max,
             "device": str(animation.solver.device.name),
-            "versions": {
-                "wfluid": __version__,
-                "warp": warp.__version__,
-                "OpenImageIO": OpenImageIO.__version__,
-                "numpy": numpy.__version__,
-            },
+            "versions": versions(),
         }
+
+
+def versions() -> dict[str, str]:
+    """Versions of wfluid and of the libraries that its results depend on."""
+    import numpy
+    import OpenImageIO
+    import warp
+
+    from wfluid import __version__
+
+    return {
+        "wfluid": __version__,
+        "warp": warp.__version__,
+        "OpenImageIO": OpenImageIO.__version__,
+        "numpy": numpy.__version__,
+    }
 
 
 def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:

@@ -22,9 +22,9 @@ from functools import partial
 import numpy as np
 import warp as wp
 
-from wfluid.device import load_kernels
+from wfluid.device import LAUNCHES, capture, load_kernels
 from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce
+from wfluid.forces import FORCE_LIMIT, GaussianForce
 from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, relaxation, transport
 from wfluid.kernels import forces as force_kernels
@@ -35,6 +35,9 @@ from wfluid.walls import Ghosts
 
 STEP_LIMIT = 10.0
 """Longest step the solver is tested with [s]."""
+
+GRAPHS_KEPT = 16
+"""Pairs of states whose graphs are kept; the oldest goes first."""
 
 SIDE_BY_SIDE = 300 * 300
 """Cells from which on a second thread saves more than it costs to wake it: 1.0x at 256^2, 1.4x at 512^2."""
@@ -61,7 +64,7 @@ class Solver:
     Building one loads the kernels. For each pair of states stepped between, the stages are captured as
     graphs and replayed from then on; the time, the step and the forces' numbers are read from device
     memory. On a CPU, stages that do not need each other run side by side: u beside v, then the map
-    beside the projection.
+    beside the projection. A solver is for one thread at a time; several may each have their own.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
@@ -100,32 +103,48 @@ class Solver:
 
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
         """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        self._check(state)
         for values, f, ghosts in zip((u, v), (state.u, state.v), self._velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
-            ghosts.fill(f)
+            with LAUNCHES:
+                ghosts.fill(f)
 
     def step(
-        self, state_in: State, state_out: State, forces: Sequence[GaussianForce], t: float, dt: float
+        self,
+        state_in: State,
+        state_out: State,
+        forces: Sequence[GaussianForce],
+        t: float,
+        dt: float,
+        *,
+        until: float | None = None,
     ) -> None:
         """Advance `state_in` at time t by dt into `state_out`, another state.
 
+        Forces act from t to `until`: t + dt unless the very number is given at which the next step
+        begins, so that rounding lets no instant fall between two steps.
+
         Raises:
-            ValueError: dt negative, not finite or above 10 s, or the two states are one.
+            ValueError: dt negative, not finite or above 10 s; the two states are one, or of another grid
+                or device; a force whose impulse is not finite or beyond the limit.
         """
         if not (math.isfinite(dt) and 0 <= dt <= STEP_LIMIT):
             raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
         if state_in is state_out:
             raise ValueError("a step cannot write the state it reads")
         diffuses = self.fluid.viscosity * dt > 0
-        controls = self._controls.setdefault(len(forces), _Controls(len(forces), self.device))
-        controls.set(self.grid, forces, t, dt)
+        self._check(state_in, state_out)
+        controls = self._controls_for(len(forces))
+        controls.set(self.grid, forces, t, dt, t + dt if until is None else until)
         if diffuses:
             self._plan_diffusion(dt)
         key = (id(state_in), id(state_out), len(forces), diffuses and self._solve_diffusion)
         if key not in self._graphs:
             stages = self._stages(state_in, state_out, controls, diffuses)
-            graphs = [[self._capture(work) for work in stage] for stage in stages]
+            graphs = [[capture(self.device, work) for work in stage] for stage in stages]
             self._graphs[key] = (graphs, state_in, state_out)
+            if len(self._graphs) > GRAPHS_KEPT:
+                del self._graphs[next(iter(self._graphs))]
         for stage in self._graphs[key][0]:
             if self._pool and len(stage) > 1:
                 list(self._pool.map(wp.capture_launch, stage))
@@ -135,6 +154,10 @@ class Solver:
 
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
+        with LAUNCHES:
+            return self._measure()
+
+    def _measure(self) -> SolveReport:
         pressure = self._pressure.measure(self._solve_pressure, self._minus_div, self._q)
         divergence = norm(self._pressure.left, self.layout)[1]
         if self._solve_diffusion.iterations:
@@ -145,21 +168,38 @@ class Solver:
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
-        controls = self._controls.setdefault(0, _Controls(0, self.device))
-        controls.set(self.grid, (), 0.0, dt)
-        self._trace(state_in, controls)
-        self._carry_map(state_in, state_out)
+        self._check(state_in, state_out)
+        controls = self._controls_for(0)
+        controls.set(self.grid, (), 0.0, dt, dt)
+        with LAUNCHES:
+            self._trace(state_in, controls)
+            self._carry_map(state_in, state_out)
 
     def diffuse(self, state_in: State, state_out: State, dt: float) -> None:
         """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
+        self._check(state_in, state_out)
         self._plan_diffusion(dt)
-        for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
-            self._diffuse(axis, f)
-            wp.copy(out, self._diffused[axis])
+        with LAUNCHES:
+            for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
+                self._diffuse(axis, f)
+                wp.copy(out, self._diffused[axis])
 
     def project(self, state_in: State, state_out: State) -> None:
         """Only project the velocity; the map of `state_out` is untouched."""
-        self._project((state_in.u, state_in.v), state_out)
+        self._check(state_in, state_out)
+        with LAUNCHES:
+            self._project((state_in.u, state_in.v), state_out)
+
+    def _check(self, *states: State) -> None:
+        """Refuse states whose arrays are not this solver's size, or not on its device."""
+        for state in states:
+            if state.grid != self.grid or state.u.device != self.device:
+                raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
+
+    def _controls_for(self, forces: int) -> _Controls:
+        if forces not in self._controls:
+            self._controls[forces] = _Controls(forces, self.device)
+        return self._controls[forces]
 
     def _how(self, wanted: Solve) -> Solve:
         """The solve wanted, or the paper's."""
@@ -193,11 +233,6 @@ class Solver:
             [partial(component, 0), partial(component, 1)],
             [partial(self._project, v3, state_out), partial(self._carry_map, state_in, state_out)],
         ]
-
-    def _capture(self, work: Callable[[], None]) -> wp.Graph:
-        with wp.ScopedCapture(device=self.device) as capture:
-            work()
-        return capture.graph
 
     def _where(self) -> list[int]:
         periodic_x, periodic_y = self.fluid.walls.periodic
@@ -272,9 +307,16 @@ class _Controls:
         )
         self._profiles: tuple[wp.array, ...] | None = None
 
-    def set(self, grid: Grid, forces: Sequence[GaussianForce], t: float, dt: float) -> None:
-        """Put the step from t to t + dt on the device."""
-        impulses = [force.envelope.integral(t, t + dt) for force in forces]
+    def set(self, grid: Grid, forces: Sequence[GaussianForce], t: float, dt: float, until: float) -> None:
+        """Put a step of dt, in which forces act from t to `until`, on the device."""
+        impulses = [force.envelope.integral(t, until) for force in forces]
+        for force, impulse in zip(forces, impulses, strict=True):
+            gained = math.hypot(*force.vector) * abs(impulse)
+            if not gained <= FORCE_LIMIT * STEP_LIMIT:
+                raise ValueError(
+                    f"the force at {force.center} would add a velocity of {gained:g} between {t:g} s and "
+                    f"{until:g} s; the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
+                )
         numbers = [dt / grid.hx, dt / grid.hy]
         numbers += [force.center[0] for force in forces]
         numbers += [force.center[1] for force in forces]

@@ -1,5 +1,8 @@
 """Frames and steps: when, how many, what they carry."""
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +10,7 @@ from hypothesis import strategies as st
 
 from wfluid.animation import Animation, PoorSolveWarning, Timeline, animate
 from wfluid.fluid import Fluid
-from wfluid.forces import Constant, GaussianForce, Instantaneous
+from wfluid.forces import Arbitrary, Constant, GaussianForce, Instantaneous
 from wfluid.picture import Picture
 
 PUSH = GaussianForce((0.5, 0.35), (3.0, 1.0), 0.1, Constant(0.0, 0.2))
@@ -91,6 +94,51 @@ def test_a_dot_moves_with_the_arrow(device):
     assert moved[0] > 3 and moved[1] > 1.5, moved
     assert moved[1] / moved[0] == pytest.approx(0.5, abs=0.05)
     assert seen.sum() == pytest.approx(dot.sum(), rel=0.02)
+
+
+@pytest.mark.parametrize("fps", [10, 12, 15, 23.976, 24, 25, 29.97, 30, 50, 60])
+@pytest.mark.parametrize("substeps", [None, 1, 3, 7])
+def test_a_blow_strikes_exactly_once_whenever_it_comes(fps, substeps):
+    """Steps share their edges to the bit, so no instant falls between two or into both."""
+    timeline = Timeline(2.0, fps, substeps)
+    steps = (timeline.frames - 1) * timeline.steps_per_frame
+    edges = [timeline.time_of(step) for step in range(steps + 1)]
+    for at in (*np.arange(0.0, 1.9, 0.05), *edges[:-1]):
+        blow = Instantaneous(float(at))
+        assert sum(blow.integral(a, b) for a, b in pairwise(edges)) == 1, at
+
+
+def test_a_blow_between_frames_moves_the_picture(device):
+    """At 0.6 s and 15 frames a second, where rounding once lost it."""
+    blow = GaussianForce((0.5, 0.35), (0.2, 0.0), 0.1, Instantaneous(0.6))
+    *_, last = animate(checkerboard(), Fluid(), [blow], 1.0, 15, cells=32, device=device.alias)
+    assert last.quality.displacement_max > 0.01
+
+
+def test_frames_never_share_memory(device):
+    """Not even where a row of pixels fills the device's buffer without a gap."""
+    image = Picture(np.random.default_rng(0).random((1, 40, 4)).astype(np.float32), 3)
+    frames = list(animate(image, Fluid(walls="periodic"), [PUSH], 0.3, 10, cells=32, device=device.alias))
+    for frame in frames[1:]:
+        assert not np.shares_memory(frame.picture.pixels, frames[0].picture.pixels)
+    np.testing.assert_array_equal(frames[0].picture.pixels, image.pixels)
+
+
+def test_animations_in_two_threads_do_not_meet(device):
+    def run(_):
+        *_, last = animate(checkerboard(), Fluid(), [PUSH], 0.3, 10, cells=32, device=device.alias)
+        return last.picture.pixels
+
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(run, range(6)))
+    for pixels in results[1:]:
+        np.testing.assert_allclose(pixels, results[0], atol=1e-5)
+
+
+def test_a_force_that_is_not_a_number_is_refused_by_its_place(device):
+    force = GaussianForce((0.5, 0.35), (1.0, 0.0), 0.1, Arbitrary(lambda _: float("nan")))
+    with pytest.raises(ValueError, match=r"force at \(0.5, 0.35\) would add"):
+        list(animate(checkerboard(), Fluid(), [force], 0.2, 10, cells=16, device=device.alias))
 
 
 def test_a_poor_solve_warns_with_its_number_and_the_remedy(device):

@@ -102,7 +102,7 @@ def test_warmup_says_what_it_did():
         (("--push", "1,2:1,1", "--cells", "1"), "cells 1"),
         (("--push", "1,2:1,1", "--width", "-4"), "width -4"),
         (("--push", "1,2:1,1", "--device", "tpu"), "there is: cpu"),
-        (("--push", "1,2:1,1", "--sharpen"), "unrecognized arguments: --sharpen"),
+        (("--push", "1,2:1,1", "--sharpen"), "there is no flag --sharpen"),
     ],
 )
 def test_bad_input_is_one_line_exit_2_and_nothing_written(small, tmp_path, options, says):

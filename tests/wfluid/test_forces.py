@@ -115,6 +115,7 @@ def carried(make_solver, force, duration, steps, n=128):
         ("256,256:6,3:radius=40", "end"),
         ("256,256:6,3:radius=40,at=0", "end"),
         ("256,256:6,3:radius=40,period=0.5", "swing"),
+        ("256,256:-6,-3:radius=40,period=0.5,phase=0.75", "swing"),
     ],
 )
 def test_a_push_carries_its_centre_by_its_arrow(make_solver, text, course):

@@ -94,7 +94,7 @@ def test_the_fast_encoding_is_the_exact_one():
     ("name", "content", "says"),
     [
         ("none.png", None, "no such picture"),
-        ("empty.png", b"", "not a picture"),
+        ("empty.png", b"", "is empty"),
         ("text.jpg", b"this is no picture at all\n", "not a picture"),
     ],
 )
@@ -107,7 +107,7 @@ def test_unreadable_pictures_are_refused_by_name(tmp_path, name, content, says):
 
 
 def test_a_folder_is_not_a_picture(tmp_path):
-    with pytest.raises(PictureError, match="not a file"):
+    with pytest.raises(PictureError, match="a folder"):
         read_picture(tmp_path)
 
 

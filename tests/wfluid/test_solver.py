@@ -285,3 +285,27 @@ def test_replayed_steps_follow_changed_inputs(make_solver):
         after.velocity + after.displacement, fresh.velocity + fresh.displacement, strict=True
     ):
         np.testing.assert_array_equal(replayed, expected)
+
+
+def test_states_of_another_grid_are_refused(make_solver):
+    """Kernels would write beyond their arrays."""
+    solver, other = make_solver(16, 16), make_solver(8, 8).rest()
+    for use in (
+        lambda: solver.step(other, solver.rest(), [], 0.0, 0.1),
+        lambda: solver.carry(solver.rest(), other, 0.1),
+        lambda: solver.diffuse(other, other, 0.1),
+        lambda: solver.project(other, solver.rest()),
+        lambda: solver.set_velocity(other, np.zeros((8, 9)), np.zeros((9, 8))),
+    ):
+        with pytest.raises(ValueError, match="a state of Grid"):
+            use()
+
+
+def test_graphs_of_passing_states_are_let_go(make_solver):
+    solver = make_solver(8, 8)
+    state = solver.rest()
+    for _ in range(40):
+        after = solver.rest()
+        solver.step(state, after, [], 0.0, 0.01)
+        state = after
+    assert len(solver._graphs) <= 16
