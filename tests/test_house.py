@@ -10,7 +10,7 @@ import wfluid
 
 ROOT = Path(__file__).parents[1]
 ORDER = [
-    "cells", "walls", "state", "multigrid", "solver", "animation", "output", "report", "cli",
+    "cells", "walls", "state", "multigrid", "linear", "solver", "animation", "output", "report", "cli",
 ]  # fmt: skip
 
 

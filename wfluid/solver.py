@@ -29,7 +29,8 @@ from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, relaxation, transport
 from wfluid.kernels import forces as force_kernels
 from wfluid.kernels.cells import Layout, Real
-from wfluid.multigrid import LinearSystem, Points, Residual, Solve, norm
+from wfluid.linear import LinearSystem, Residual, Solve, norm
+from wfluid.multigrid import Points
 from wfluid.state import State, field, from_numpy
 from wfluid.walls import Ghosts
 

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from oracles import laplacian_2d, sparse_laplacian
 
+from wfluid.chebyshev import chebyshev_count, chebyshev_factors
 from wfluid.grid import Grid
-from wfluid.multigrid import LinearSystem, Points, Solve, chebyshev_count, chebyshev_factors
+from wfluid.linear import LinearSystem, Solve
+from wfluid.multigrid import Points
 from wfluid.state import field, from_numpy, to_numpy
 from wfluid.walls import Rule
 
