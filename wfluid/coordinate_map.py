@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from wfluid.device import LAUNCHES
+from wfluid.device import exclusive
 from wfluid.grid import Grid
 from wfluid.kernels import measure
 from wfluid.kernels.cells import Real
@@ -27,6 +27,7 @@ class CoordinateMap:
     """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
 
     @classmethod
+    @exclusive
     def of_state(cls, state: State, walls: Walls) -> CoordinateMap:
         """A copy of a state's map."""
         return cls(state.grid, walls, np.stack(state.displacement, axis=2))
@@ -56,14 +57,14 @@ class MapQuality:
     """Part of the cells whose source lies beyond a closed edge."""
 
 
+@exclusive
 def measure_map(state: State, walls: Walls) -> MapQuality:
     """Judge a state's map, on its device."""
     layout, device, grid = state.layout, state.u.device, state.grid
     least, greatest, outside = (wp.empty(layout.ny, dtype=Real, device=device) for _ in range(3))
     closed = [int(not periodic) for periodic in walls.periodic]
     inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
-    with LAUNCHES:
-        measure.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
+    measure.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
     length = np.hypot(*state.displacement)
     return MapQuality(
         float(least.numpy().min()),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 
 import warp as wp
@@ -13,7 +14,18 @@ from wfluid.files import quiet_stderr
 from wfluid.kernels.cells import module_of
 
 LAUNCHES = threading.RLock()
-"""Held while graphs are captured or kernels launched one by one: Warp captures what any thread launches."""
+"""Held by whatever calls Warp but for replays: a capture takes in what any thread allocates or launches."""
+
+
+def exclusive(method: Callable) -> Callable:
+    """Hold `LAUNCHES` while `method` runs."""
+
+    @wraps(method)
+    def held(*arguments, **settings):
+        with LAUNCHES:
+            return method(*arguments, **settings)
+
+    return held
 
 
 def capture(device: wp.Device, work: Callable[[], None]) -> wp.Graph:

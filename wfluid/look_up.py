@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import warp as wp
 
-from wfluid.device import LAUNCHES, capture
+from wfluid.device import LAUNCHES, capture, exclusive
 from wfluid.grid import Grid
 from wfluid.kernels import lookup
 from wfluid.kernels.cells import HALO, Layout, Real, whole_spans
@@ -70,6 +70,7 @@ class LookUp:
     between its cores.
     """
 
+    @exclusive
     def __init__(
         self,
         picture: Picture,
@@ -97,6 +98,7 @@ class LookUp:
         rules = (walls.moved_x_rules(), walls.moved_y_rules())
         self._ghosts = [Ghosts(self._strip, axis, device) for axis in rules]
         self._stretched = [field(self._strip, device) for _ in range(2)]
+        self._still = field(self._grid, device)
         self._coordinates = [field(self._layout, device) for _ in range(2)]
         self._out = [
             wp.zeros(self._layout.size, dtype=lookup.Pixel, device=device) for _ in self._source.quads
@@ -130,7 +132,7 @@ class LookUp:
         """What a still map shows, to the bit; with the transparent edge it has its alpha."""
         pixels, alpha = self.picture.pixels, self.picture.alpha
         if (self.width, self.height) != (self.picture.width, self.picture.height):
-            still = wp.zeros(self._grid.size, dtype=Real, device=self.device)
+            still = self._still
             return self.render(still, still)
         if alpha != self._source.alpha:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)

@@ -22,7 +22,7 @@ from functools import partial
 import numpy as np
 import warp as wp
 
-from wfluid.device import LAUNCHES, capture, load_kernels
+from wfluid.device import capture, exclusive, load_kernels
 from wfluid.fluid import Fluid
 from wfluid.forces import FORCE_LIMIT, GaussianForce
 from wfluid.grid import Grid
@@ -68,6 +68,7 @@ class Solver:
     beside the projection. A solver is for one thread at a time; several may each have their own.
     """
 
+    @exclusive
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
@@ -98,17 +99,18 @@ class Solver:
         threads = not device.is_cuda and (os.cpu_count() or 1) > 1 and grid.nx * grid.ny >= SIDE_BY_SIDE
         self._pool = ThreadPoolExecutor(2) if threads else None
 
+    @exclusive
     def rest(self) -> State:
         """A new state: a still fluid under an untouched picture."""
         return State.at_rest(self.grid, self.device)
 
+    @exclusive
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
         """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
         self._check(state)
         for values, f, ghosts in zip((u, v), (state.u, state.v), self._velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
-            with LAUNCHES:
-                ghosts.fill(f)
+            ghosts.fill(f)
 
     def step(
         self,
@@ -133,10 +135,28 @@ class Solver:
             raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
         if state_in is state_out:
             raise ValueError("a step cannot write the state it reads")
-        diffuses = self.fluid.viscosity * dt > 0
         self._check(state_in, state_out)
+        for stage in self._graphs_for(state_in, state_out, forces, t, dt, t + dt if until is None else until):
+            if self._pool and len(stage) > 1:
+                list(self._pool.map(wp.capture_launch, stage))
+            else:
+                for graph in stage:
+                    wp.capture_launch(graph)
+
+    @exclusive
+    def _graphs_for(
+        self,
+        state_in: State,
+        state_out: State,
+        forces: Sequence[GaussianForce],
+        t: float,
+        dt: float,
+        until: float,
+    ) -> list[list[wp.Graph]]:
+        """The step's graphs, captured at first, with its numbers put where they read them."""
+        diffuses = self.fluid.viscosity * dt > 0
         controls = self._controls_for(len(forces))
-        controls.set(self.grid, forces, t, dt, t + dt if until is None else until)
+        controls.set(self.grid, forces, t, dt, until)
         if diffuses:
             self._plan_diffusion(dt)
         key = (id(state_in), id(state_out), len(forces), diffuses and self._solve_diffusion)
@@ -146,19 +166,11 @@ class Solver:
             self._graphs[key] = (graphs, state_in, state_out)
             if len(self._graphs) > GRAPHS_KEPT:
                 del self._graphs[next(iter(self._graphs))]
-        for stage in self._graphs[key][0]:
-            if self._pool and len(stage) > 1:
-                list(self._pool.map(wp.capture_launch, stage))
-            else:
-                for graph in stage:
-                    wp.capture_launch(graph)
+        return self._graphs[key][0]
 
+    @exclusive
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
-        with LAUNCHES:
-            return self._measure()
-
-    def _measure(self) -> SolveReport:
         pressure = self._pressure.measure(self._solve_pressure, self._minus_div, self._q)
         divergence = norm(self._pressure.left, self.layout)[1]
         if self._solve_diffusion.iterations:
@@ -167,29 +179,29 @@ class Solver:
             diffusion = Residual("none", 0, 0.0, 0.0)
         return SolveReport(pressure, diffusion, divergence)
 
+    @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
         self._check(state_in, state_out)
         controls = self._controls_for(0)
         controls.set(self.grid, (), 0.0, dt, dt)
-        with LAUNCHES:
-            self._trace(state_in, controls)
-            self._carry_map(state_in, state_out)
+        self._trace(state_in, controls)
+        self._carry_map(state_in, state_out)
 
+    @exclusive
     def diffuse(self, state_in: State, state_out: State, dt: float) -> None:
         """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
         self._plan_diffusion(dt)
-        with LAUNCHES:
-            for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
-                self._diffuse(axis, f)
-                wp.copy(out, self._diffused[axis])
+        for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
+            self._diffuse(axis, f)
+            wp.copy(out, self._diffused[axis])
 
+    @exclusive
     def project(self, state_in: State, state_out: State) -> None:
         """Only project the velocity; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
-        with LAUNCHES:
-            self._project((state_in.u, state_in.v), state_out)
+        self._project((state_in.u, state_in.v), state_out)
 
     def _check(self, *states: State) -> None:
         """Refuse states whose arrays are not this solver's size, or not on its device."""
