@@ -32,10 +32,10 @@ def device(request):
 
 @pytest.fixture
 def make_solver(device):
-    """A solver for nx, ny and the keywords of Fluid; the domain's height follows the cell counts."""
+    """A solver for nx, ny and the keywords of Fluid; cells are `stretch` times as high as wide."""
 
-    def make(nx, ny, **fluid):
+    def make(nx, ny, stretch=0.93, **fluid):
         longer = max(nx, ny)
-        return Solver(Grid(nx, ny, nx / longer, ny / longer), Fluid(**fluid), device)
+        return Solver(Grid(nx, ny, nx / longer, stretch * ny / longer), Fluid(**fluid), device)
 
     return make

@@ -91,7 +91,7 @@ def test_a_gaussian_force_has_its_shape_on_the_faces(make_solver, walls):
 
 def carried(make_solver, force, duration, steps, n=128):
     """Path of the particle that starts at the force's center (velocity read bilinearly, Heun steps)."""
-    solver = make_solver(n, n, viscosity=0.0)
+    solver = make_solver(n, n, stretch=1, viscosity=0.0)
     now, after = solver.rest(), solver.rest()
     place, path, dt = np.array(force.center), [], duration / steps
 
