@@ -46,7 +46,8 @@ def inner(source, margin):
 
 
 @pytest.mark.parametrize(
-    ("filter", "name", "width"), [("bilinear", "triangle", 2.0), ("cubic", "catmull-rom", 4.0)]
+    ("filter", "name", "width"),
+    [("bilinear", "triangle", 2.0), ("cubic", "catmull-rom", 4.0), ("lanczos", "lanczos3", 6.0)],
 )
 def test_look_up_equals_st_warp(device, filter, name, width):
     """More than 60 dB on white noise, the hardest picture, with OpenImageIO reading the same map."""

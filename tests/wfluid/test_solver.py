@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import warp as wp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import divergence, from_streamfunction, laplacian_2d, noise_velocity
 
+from wfluid.device import open_device
 from wfluid.fluid import Fluid
 from wfluid.forces import Constant, GaussianForce, Instantaneous
 from wfluid.grid import Grid
@@ -309,3 +311,19 @@ def test_graphs_of_passing_states_are_let_go(make_solver):
         solver.step(state, after, [], 0.0, 0.01)
         state = after
     assert len(solver._graphs) <= 16
+
+
+@pytest.mark.parametrize("walls", ["free-slip", "periodic,no-slip"])
+def test_cuda_gives_the_cpus_results(walls):
+    """To float32 rounding over ten steps, where a GPU is present."""
+    open_device()
+    if not wp.get_cuda_devices():
+        pytest.skip("no CUDA device here")
+    force = GaussianForce((0.4, 0.3), (3.0, -2.0), 0.1, Constant(0, 0.2))
+    results = []
+    for name in ("cpu", "cuda"):
+        solver = Solver(Grid(48, 40, 1.0, 0.8), Fluid(walls=walls, viscosity=0.002), open_device(name))
+        state = run(solver, [force], 10, 0.02)
+        results.append(state.velocity + state.displacement)
+    for cpu, cuda in zip(*results, strict=True):
+        np.testing.assert_allclose(cuda, cpu, atol=2e-5)
