@@ -217,7 +217,7 @@ def run_animate(options: argparse.Namespace) -> int:
         edge=options.edge,
         device=options.device,
     )
-    check_memory(animation)
+    check_memory(animation, _keeps_frames(options.output))
     output = open_output(options.output, timeline.fps, options.start, encoding) if options.output else None
     if options.dry_run:
         _say_plan(animation, options.output)
@@ -246,12 +246,16 @@ def _size(options: argparse.Namespace, picture) -> tuple[int | None, int | None]
     return width, max(1, round(width * picture.height / picture.width))
 
 
+def _keeps_frames(output: str | None) -> bool:
+    return output is not None and output.lower().endswith(".gif")
+
+
 def _say_plan(animation, output: str | None) -> None:
     """Print what a run would take and write."""
     from wfluid.estimate import estimate
     from wfluid.files import readable_size
 
-    timeline, grid, guess = animation.timeline, animation.grid, estimate(animation)
+    timeline, grid, guess = animation.timeline, animation.grid, estimate(animation, _keeps_frames(output))
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     size = animation.width or animation.picture.width, animation.height or animation.picture.height
     print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")

@@ -22,6 +22,9 @@ SECONDS_PER_PIXEL = 40e-9
 QUEUED_FRAMES = 6
 """Frames in flight between computing and writing."""
 
+PROGRAM = 240e6
+"""Bytes that Python and the libraries take before the first array."""
+
 _REAL = 4
 
 
@@ -35,8 +38,11 @@ class Estimate:
     """Time without compiling and writing."""
 
 
-def estimate(animation: Animation) -> Estimate:
-    """Memory and time of an animation, from its sizes alone."""
+def estimate(animation: Animation, frames_kept: bool = False) -> Estimate:
+    """Memory and time of an animation, from its sizes alone.
+
+    `frames_kept` for outputs that hold every frame until the last: a GIF's palette needs them all.
+    """
     grid, picture = animation.grid, animation.picture
     width, height = animation.width or picture.width, animation.height or picture.height
     channels = -(-picture.pixels.shape[2] // 4) * 4
@@ -45,22 +51,24 @@ def estimate(animation: Animation) -> Estimate:
         + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
         + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
     )
+    memory += PROGRAM + frames_kept * 3 * animation.timeline.frames * width * height
     steps = (animation.timeline.frames - 1) * animation.timeline.steps_per_frame
     seconds = steps * grid.nx * grid.ny * SECONDS_PER_CELL_STEP
     seconds += animation.timeline.frames * width * height * SECONDS_PER_PIXEL
     return Estimate(memory, seconds)
 
 
-def check_memory(animation: Animation) -> None:
+def check_memory(animation: Animation, frames_kept: bool = False) -> None:
     """Refuse an animation that will not fit.
 
     Raises:
         ValueError: with what it needs and what there is.
     """
-    need, there = estimate(animation).memory, free_memory()
+    need, there = estimate(animation, frames_kept).memory, free_memory()
     if need > there:
         raise ValueError(
-            f"{animation.grid.nx} x {animation.grid.ny} cells and frames of {animation.picture.width} x "
-            f"{animation.picture.height} pixels need about {readable_size(need)} of memory, "
-            f"{readable_size(there)} are free; lower --cells or --width"
+            f"{animation.grid.nx} x {animation.grid.ny} cells and {animation.timeline.frames} frames "
+            f"{animation.width or animation.picture.width} pixels wide need about {readable_size(need)} of "
+            f"memory, {readable_size(there)} are free; lower --cells or --width"
+            + (", or write a movie or a sequence instead of a GIF" if frames_kept else "")
         )

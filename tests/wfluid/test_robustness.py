@@ -441,6 +441,14 @@ def test_a_dry_run_says_what_it_would_do_and_writes_nothing(small, tmp_path):
         assert line in result.stdout, result.stdout
 
 
+def test_a_gif_too_long_for_the_memory_is_refused(small, tmp_path):
+    """It keeps its frames for the palette; a movie of the same length does not."""
+    options = ("--duration", "6000", "--fps", "15", "--width", "4000", "--dry-run")
+    result = wfluid("animate", small, "-o", tmp_path / "a.gif", *PUSH, *options)
+    assert result.returncode == 2 and "write a movie" in result.stderr
+    assert wfluid("animate", small, "-o", tmp_path / "a.####.png", *PUSH, *options).returncode == 0
+
+
 def test_version_names_what_it_runs_on():
     result = wfluid("--version")
     assert result.returncode == 0
