@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wfluid import Animation, Fluid, Timeline, read_picture, write_animation
-from wfluid.push import Push
+from wfluid import Animation, Fluid, Push, Timeline, read_picture, write_animation
 
 PICTURE = Path(__file__).parent / "images" / "raccoon.jpg"
 
