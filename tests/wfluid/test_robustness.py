@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 import pytest
 
 from wfluid.files import remove_leftovers, whole_file
-from wfluid.picture import Encoding, Picture, PictureError, read_picture, write_picture
+from wfluid.picture import Picture, PictureError, read_picture, write_picture
 
 PUSH = ("--push", "30,20:5,0:radius=8")
 QUICK = ("--cells", "16", "--duration", "0.2", "--fps", "10", "--quiet")
@@ -282,112 +282,6 @@ def test_mutated_files_never_crash_or_hang(tmp_path, ending):
     )
     assert result.returncode == 0, f"exit {result.returncode}: {result.stderr[-600:]}"
     assert result.stdout.strip() == "read 50"
-
-
-@pytest.mark.parametrize("orientation", range(1, 9))
-def test_exif_orientation_is_honoured(tmp_path, orientation):
-    """Red marks the top-left of the upright picture, green its top-right (EXIF 2.32, figure 15)."""
-    upright = np.zeros((24, 40, 3), np.uint8)
-    upright[:8, :8, 0] = 255
-    upright[:8, -8:, 1] = 255
-    stored = {
-        1: upright,
-        2: upright[:, ::-1],
-        3: np.rot90(upright, 2),
-        4: upright[::-1],
-        5: np.rot90(upright[:, ::-1]),
-        6: np.rot90(upright),
-        7: np.rot90(upright[:, ::-1], -1),
-        8: np.rot90(upright, -1),
-    }[orientation]
-    spec = oiio.ImageSpec(stored.shape[1], stored.shape[0], 3, "uint8")
-    spec.attribute("Orientation", orientation)
-    out = oiio.ImageOutput.create(str(tmp_path / "a.tif"))
-    assert (
-        out.open(str(tmp_path / "a.tif"), spec)
-        and out.write_image(np.ascontiguousarray(stored))
-        and out.close()
-    )
-    picture = read_picture(tmp_path / "a.tif")
-    assert picture.pixels.shape == (24, 40, 3)
-    np.testing.assert_array_equal(picture.pixels[2, 2], (1, 0, 0))
-    np.testing.assert_array_equal(picture.pixels[2, -3], (0, 1, 0))
-    write_picture(tmp_path / "b.tif", picture)
-    np.testing.assert_array_equal(read_picture(tmp_path / "b.tif").pixels, picture.pixels)
-
-
-def test_further_channels_metadata_and_windows_travel(tmp_path):
-    """Seven channels with their names, an attribute, a display window larger than the data."""
-    spec = oiio.ImageSpec(20, 12, 7, "float")
-    spec.channelnames = ("R", "G", "B", "A", "Z", "id.x", "id.y")
-    spec.alpha_channel = 3
-    spec.x, spec.y, spec.full_width, spec.full_height = 5, 3, 64, 32
-    spec.attribute("comment", "kept")
-    values = (np.random.default_rng(0).random((12, 20, 7)) * 4 - 1).astype(np.float32)
-    out = oiio.ImageOutput.create(str(tmp_path / "a.exr"))
-    assert out.open(str(tmp_path / "a.exr"), spec) and out.write_image(values) and out.close()
-    picture = read_picture(tmp_path / "a.exr")
-    assert picture.pixels.shape[2] == 7 and picture.pixels.min() < 0 and picture.pixels.max() > 1
-    write_picture(tmp_path / "b.exr", picture)
-    a, b = (oiio.ImageBuf(str(tmp_path / name)) for name in ("a.exr", "b.exr"))
-    np.testing.assert_array_equal(a.get_pixels(oiio.FLOAT), b.get_pixels(oiio.FLOAT))
-    for name in ("x", "y", "full_width", "full_height", "channelnames", "alpha_channel"):
-        assert getattr(a.spec(), name) == getattr(b.spec(), name), name
-    assert b.spec().get_string_attribute("comment") == "kept"
-    write_picture(tmp_path / "c.png", picture)  # what a PNG has no room for is dropped
-    assert oiio.ImageBuf(str(tmp_path / "c.png")).spec().nchannels == 4
-
-
-def test_premultiplied_edges_do_not_darken(tmp_path, device):
-    """A white disc on transparent black, moved: where there is colour it stays white."""
-    from wfluid import Fluid, GaussianForce, animate
-
-    x, y = np.arange(80), np.arange(80)[:, None]
-    alpha = np.clip(20 - np.hypot(x - 40, y - 40), 0, 1)
-    values = np.zeros((80, 80, 4), np.uint8)
-    values[..., :3] = np.where(alpha[..., None] > 0, 255, 0)
-    values[..., 3] = np.rint(alpha * 255)
-    spec = oiio.ImageSpec(80, 80, 4, "uint8")
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    out = oiio.ImageOutput.create(str(tmp_path / "a.png"))
-    assert out.open(str(tmp_path / "a.png"), spec) and out.write_image(values) and out.close()
-    push = GaussianForce((0.5, 0.5), (2.0, 1.0), 0.2)
-    *_, last = animate(
-        read_picture(tmp_path / "a.png"), Fluid(), [push], 0.4, 10, cells=40, device=device.alias
-    )
-    assert last.quality.displacement_max > 0.02
-    write_picture(tmp_path / "b.png", last.picture)
-    hints = oiio.ImageSpec()
-    hints.attribute("oiio:UnassociatedAlpha", 1)
-    back = (
-        oiio.ImageInput.open(str(tmp_path / "b.png"), hints)
-        .read_image(0, 0, 0, 4, "uint8")
-        .reshape(80, 80, 4)
-    )
-    visible = back[..., 3] > 12
-    assert visible.sum() > 900
-    assert back[visible][:, :3].min() >= 250
-
-
-@pytest.mark.parametrize(("colorspace", "value"), [("auto", 0.2140), ("srgb", 0.2140), ("linear", 0.5)])
-def test_a_flag_overrides_the_colorspace(tmp_path, colorspace, value):
-    write_picture(tmp_path / "a.tif", Picture(np.full((4, 4, 3), 0.2140, np.float32), dtype="uint16"))
-    assert read_picture(tmp_path / "a.tif", colorspace).pixels[0, 0, 0] == pytest.approx(value, abs=1e-3)
-
-
-def test_types_compressions_and_qualities_reach_the_file(tmp_path):
-    picture = Picture(np.random.default_rng(0).random((40, 40, 3)).astype(np.float32), dtype="uint8")
-    for type_, compression in (("half", "piz"), ("float", "zips")):
-        write_picture(tmp_path / "a.exr", picture, Encoding(type_, compression))
-        spec = oiio.ImageBuf(str(tmp_path / "a.exr")).nativespec()
-        assert (str(spec.format), spec.get_string_attribute("compression")) == (type_, compression)
-    sizes = []
-    for quality in (10, 95):
-        write_picture(tmp_path / "a.jpg", picture, Encoding(quality=quality))
-        sizes.append((tmp_path / "a.jpg").stat().st_size)
-    assert sizes[0] < sizes[1] / 2
-    with pytest.raises(PictureError, match=r"not for \.png"):
-        write_picture(tmp_path / "a.png", picture, Encoding(compression="piz"))
 
 
 def test_a_movie_read_back_has_its_frames_and_duration(small, tmp_path):

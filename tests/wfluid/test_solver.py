@@ -255,7 +255,6 @@ def test_bounded_for_any_step_force_and_viscosity(device, walls, viscosity, dt, 
     steps = 12
     state = run(solver, [force], steps, dt)
     bound = 4 * abs(strength) * dt * steps + 1e-6
-    assert np.isfinite(bound)
     for f in (*state.velocity, *state.displacement):
         assert np.all(np.isfinite(f))
     assert max(np.abs(f).max() for f in state.velocity) <= bound
