@@ -5,24 +5,30 @@ Importing the package registers every program, so that each device's module is b
 
 from wfluid.kernels import (
     advection,
+    dense,
     forces,
     ghosts,
+    krylov,
     lookup,
     measure,
     projection,
     relaxation,
     transfer,
     transport,
+    viscosity,
 )
 
 __all__ = [
     "advection",
+    "dense",
     "forces",
     "ghosts",
+    "krylov",
     "lookup",
     "measure",
     "projection",
     "relaxation",
     "transfer",
     "transport",
+    "viscosity",
 ]

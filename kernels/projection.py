@@ -3,7 +3,10 @@
 On the staggered grid the divergence D lives at centres, the gradient G = -D^T on faces, and the
 Laplacian solved (`relaxation`) is exactly D G: what the solver leaves of D G q = D v is what is left
 of the divergence. With face coefficients beta the velocity becomes v - beta grad q and the operator
-D beta G. Faces on a wall keep zero through their ghosts. Bonilla & Velho, section II, step 4;
+D beta G. A pressure known from the step before may be taken off first (`subtract_slope`): what is left to
+project is then small, and so is the strain that projecting puts back where viscosity had taken it out
+(incremental pressure correction; Guermond, Minev & Shen, Comput. Methods Appl. Mech. Eng. 195, 2006,
+section 3.2). Faces on a wall keep zero through their ghosts. Bonilla & Velho, section II, step 4;
 Bridson, 2nd ed., chapter 5.
 """
 
@@ -27,6 +30,23 @@ def minus_divergence(
     k = inside(k)
     south = inside(k + pitch)
     b[k] = inverse_hx * (u[k] - u[k + 1]) + inverse_hy * (v[k] - v[south])
+
+
+@cells
+def subtract_slope(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    p: Field,
+    dt_h: Uniform,
+    before: int,
+    # outputs
+    out: Field,
+):
+    """f - dt dp/ds on the face between centres k - `before` and k, one component of v - dt grad p."""
+    k = inside(k)
+    out[k] = f[k] - dt_h * (p[k] - p[inside(k - before)])
 
 
 @cells

@@ -16,7 +16,7 @@ Loan, Matrix Computations, 4th ed., 11.2.8; Briggs, Henson & McCormick, A Multig
 """
 
 import warp as wp
-from wfluid.kernels.cells import Field, Real, Uniform, cells, inside, lines
+from wfluid.kernels.cells import Field, Real, Uniform, cells, inside
 
 
 @wp.func
@@ -68,6 +68,21 @@ def first_two_sweeps(
     """
     k = inside(k)
     out[k] = own * b[k] + near * neighbours(b, k, pitch, ax, ay)
+
+
+@cells
+def scaled(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    rate: Uniform,
+    # outputs
+    out: Field,
+):
+    """The sweep from zero: out = rate b."""
+    k = inside(k)
+    out[k] = rate * b[k]
 
 
 @cells
@@ -145,6 +160,26 @@ def jacobi_beta(
 
 
 @cells
+def first_sweep_beta(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    beta_x: Field,
+    beta_y: Field,
+    damping: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """The sweep from zero: out = damping b / centre."""
+    k = inside(k)
+    out[k] = damping * b[k] / outflow_centre(beta_x, beta_y, k, pitch, ax, ay)
+
+
+@cells
 def residual_beta(
     i: int,
     j: int,
@@ -162,24 +197,3 @@ def residual_beta(
     """r = b + div (beta grad x)."""
     k = inside(k)
     r[k] = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)
-
-
-@lines
-def dense_solve(
-    t: int,
-    inverse: Field,
-    b: Field,
-    nx: int,
-    ny: int,
-    pitch: int,
-    # outputs
-    x: Field,
-):
-    """Row t of x = inverse b on a grid of so few cells that the inverse is stored."""
-    unknowns = nx * ny
-    total = Real(0.0)
-    for other in range(unknowns):
-        row = other // nx
-        total += inverse[t * unknowns + other] * b[(row + 2) * pitch + 2 + other - row * nx]
-    row = t // nx
-    x[(row + 2) * pitch + 2 + t - row * nx] = total

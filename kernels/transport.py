@@ -65,3 +65,26 @@ def carry_map_bilinear(
     at = (row + 2) * pitch + column + 2
     out_x[k] = bilinear(d_x, at, pitch, tx, ty) + foot_x[k]
     out_y[k] = bilinear(d_y, at, pitch, tx, ty) + foot_y[k]
+
+
+@cells
+def carried_along(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    d_x: Field,
+    d_y: Field,
+    nx: int,
+    ny: int,
+    periodic_x: int,
+    periodic_y: int,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """What of a field on the source picture is at centre k now: f(x + d), bilinear, so within its range."""
+    k = inside(k)
+    column, tx = locate(i, d_x[k], nx, periodic_x)
+    row, ty = locate(j, d_y[k], ny, periodic_y)
+    out[k] = bilinear(f, (row + 2) * pitch + column + 2, pitch, tx, ty)

@@ -32,10 +32,13 @@ def device(request):
 
 @pytest.fixture
 def make_solver(device):
-    """A solver for nx, ny and the keywords of Fluid; cells are `stretch` times as high as wide."""
+    """A solver for nx, ny and the keywords of Fluid; cells are `stretch` times as high as wide.
 
-    def make(nx, ny, stretch=0.93, **fluid):
+    Or for a `grid` of its own.
+    """
+
+    def make(nx, ny, stretch=0.93, grid=None, **fluid):
         longer = max(nx, ny)
-        return Solver(Grid(nx, ny, nx / longer, stretch * ny / longer), Fluid(**fluid), device)
+        return Solver(grid or Grid(nx, ny, nx / longer, stretch * ny / longer), Fluid(**fluid), device)
 
     return make

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
-from wfluid.walls import Walls
+import numpy as np
+
+from wfluid.painted import Freeze, Painted, Quantity, as_quantity, check_painted
+from wfluid.walls import Wall, Walls
 
 SCHEMES = ("standard", "paper")
 SOLVERS = ("multigrid", "jacobi")
-
-VISCOSITY_LIMIT = 1e3
-"""Largest viscosity the solver is tested with [longer side^2/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,8 +21,14 @@ class Fluid:
         ValueError: a value outside its range, with the range.
     """
 
-    viscosity: float = 0.001
-    """Kinematic viscosity mu [longer side^2/s], 0 … 1000. The paper's figure 2: 0.001 … 0.005."""
+    viscosity: Quantity | np.ndarray = 0.001
+    """Kinematic viscosity mu [longer side^2/s], 0 … 1000: a number (the paper's figure 2: 0.001 …
+    0.005), an array (height, width) of any size over the picture, a `Painted` picture, `Keyed` ones, or
+    a function of the time [s] that gives any of these."""
+    viscosity_moves: bool = False
+    """Whether a painted viscosity moves with the picture, instead of staying where it is painted."""
+    freeze: Freeze | None = None
+    """What holds parts of the picture in place."""
     walls: Walls | str = field(default_factory=Walls)
     """Condition at the picture's edges: a `Walls`, or "free-slip", "no-slip", "periodic" or two of
     them as "x,y"."""
@@ -42,8 +47,11 @@ class Fluid:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "walls", Walls.parse(self.walls))
-        if not (math.isfinite(self.viscosity) and 0 <= self.viscosity <= VISCOSITY_LIMIT):
-            raise ValueError(f"viscosity {self.viscosity}: expected 0 … {VISCOSITY_LIMIT:g}")
+        object.__setattr__(self, "viscosity", as_quantity("viscosity", self.viscosity))
+        if isinstance(self.viscosity, Painted):
+            check_painted(self.viscosity.values)
+        if self.freeze is not None and not isinstance(self.freeze, Freeze):
+            raise TypeError(f"freeze: expected Freeze(mask), got {type(self.freeze).__name__}")
         _one_of("scheme", self.scheme, SCHEMES)
         if self.solver is None:
             object.__setattr__(self, "solver", "jacobi" if self.scheme == "paper" else "multigrid")
@@ -53,6 +61,16 @@ class Fluid:
                 raise ValueError(f"{name} {getattr(self, name)}: expected a whole number from 1 on")
         if not 1e-12 <= self.diffusion_tolerance <= 0.5:
             raise ValueError(f"diffusion_tolerance {self.diffusion_tolerance}: expected 1e-12 … 0.5")
+
+    @property
+    def uniform(self) -> bool:
+        """Whether one viscosity, and no drag, holds everywhere and at all times."""
+        return isinstance(self.viscosity, float) and self.freeze is None
+
+    @property
+    def separable(self) -> bool:
+        """Whether the two components of the velocity may be diffused apart from each other."""
+        return self.uniform and Wall.NO_SLIP not in (self.walls.x, self.walls.y)
 
 
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:

@@ -1,199 +1,292 @@
-"""Linear solves: symmetric multigrid cycles, Chebyshev sweeps and plain Jacobi sweeps.
+"""Linear solves: symmetric multigrid cycles, Chebyshev sweeps, conjugate gradients, plain Jacobi sweeps.
 
-All solve (shift - scale Lap) x = b on one kind of grid point (centres, x-faces or y-faces):
-diffusion has shift 1 and scale dt mu, pressure shift 0 and scale 1, with face coefficients where
-something resists (div beta grad). A fixed number of V-cycles from zero is a symmetric linear operator:
-its adjoint is itself, converged or not. So is a fixed polynomial of the operator, which is what sweeps
-are. On the coarsest level, of at most `DENSE` unknowns, a stored inverse solves exactly.
+All solve A x = b for the equations in `equations`. A fixed number of V-cycles from zero is a symmetric
+linear operator: its adjoint is itself, converged or not. So is a fixed polynomial of the operator, which
+is what sweeps are. Conjugate gradients, preconditioned by the cycle, run to a tolerance instead, where
+coefficients jump and cycles alone would stall. On the coarsest level a stored inverse solves exactly.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
 
 from wfluid.chebyshev import chebyshev_count, chebyshev_factors
-from wfluid.kernels import measure, relaxation
+from wfluid.kernels import dense, krylov, measure, relaxation
 from wfluid.kernels.cells import Layout, Real
-from wfluid.multigrid import Level, Points, Transfer, coarse_faces, coarser, face_field, matrix_of
-from wfluid.state import field
-
-DENSE = 64
-"""Unknowns that the stored inverse of the coarsest level may have."""
+from wfluid.multigrid import Level, Transfer
+from wfluid.state import Vector, vector
 
 SWEEP_LIMIT = 14
 """Chebyshev sweeps that cost about as much as two cycles."""
 
-CYCLE_INTERVAL = (0.8, 1.0)
-"""Where the eigenvalues of one cycle times A lie; the cycles' Chebyshev factors damp this interval."""
+ITERATION_LIMIT = 60
+"""Most iterations of conjugate gradients: tens at contrasts of 1e4, so that more will not help."""
 
 
 @dataclass(frozen=True)
 class Solve:
-    """How a system is solved: a method and how often it is applied. Linear and symmetric, all three."""
+    """How a system is solved: a method and how often it is applied."""
 
     method: str
-    """"multigrid", "chebyshev" or "jacobi"."""
+    """"multigrid", "chebyshev" or "jacobi", which are linear and symmetric; or "conjugate gradients"."""
     iterations: int
-    """Cycles or sweeps, from zero."""
+    """Cycles or sweeps, from zero; of conjugate gradients the most."""
+    tolerance: float = 0.0
+    """Of conjugate gradients: the part of the solution, in the norm of A, that may be missing."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What a solve left: the method, how many cycles or sweeps it ran, ||b - A x|| and ||b||."""
+    """What a solve left: the method, how many cycles or sweeps it ran, ||b - A x||, ||b||, ||A|| ||x||."""
 
     method: str
     iterations: int
     norm: float
     norm_b: float
+    norm_ax: float = 0.0
 
     @property
     def relative(self) -> float:
         """||b - A x|| / ||b||, 0 for b = 0."""
         return self.norm / self.norm_b if self.norm_b > 0 else 0.0
 
+    @property
+    def backward(self) -> float:
+        """||b - A x|| / (||b|| + ||A|| ||x||), which rounding keeps above about 1e-7 in float32."""
+        whole = self.norm_b + self.norm_ax
+        return self.norm / whole if whole > 0 else 0.0
+
 
 class LinearSystem:
-    """(shift - scale Lap) x = b, or -div (beta grad x) = b, on `points` of an nx by ny grid."""
+    """An equation on a hierarchy of grids.
 
-    def __init__(self, nx: int, ny: int, points: Points, device: wp.Device):
-        self.device = device
-        self.levels = [Level(nx, ny, points, device)]
-        self.transfers: list[Transfer] = []
-        while nx * ny > DENSE:
-            nx, ny = coarser(nx, ny, points.size)
-            self.levels.append(Level(nx, ny, points, device))
-            self.transfers.append(Transfer(*self.levels[-2:], device))
-        top = self.levels[0].layout
-        self.zero, self.left, self.correction, self.spare = (field(top, device) for _ in range(4))
-        self.inverse = wp.zeros((nx * ny) ** 2, dtype=Real, device=device)
+    `interval` holds the eigenvalues of one cycle times A; the factors of several cycles damp it. An
+    equation that leaves a constant free is `singular`: then the mean of b must be zero.
+    """
+
+    def __init__(
+        self,
+        levels: Sequence[Level],
+        device: wp.Device,
+        interval: tuple[float, float],
+        singular: bool = False,
+    ):
+        self.device, self.levels, self.interval, self.singular = device, list(levels), interval, singular
+        self.transfers = [Transfer(fine, coarse, device) for fine, coarse in pairwise(self.levels)]
+        top, coarsest = self.levels[0], self.levels[-1].layout
+        components = len(top.points)
+        self.zero, self.left, self.correction, self.spare = (
+            vector(top.layout, device, components) for _ in range(4)
+        )
+        self.unknowns = coarsest.nx * coarsest.ny * components
+        self._matrices = [wp.zeros(self.unknowns**2, dtype=Real, device=device) for _ in range(2)]
+        self._dense = wp.zeros(self.unknowns, dtype=Real, device=device)
         self._factors: dict[int, wp.array] = {}
         self._rates = wp.zeros(SWEEP_LIMIT, dtype=Real, device=device)
-        self._coefficients: tuple[float, float] | None = None
+        self._conjugate: _ConjugateGradients | None = None
 
-    def set_coefficients(self, shift: float, scale: float) -> None:
-        """Take the operator shift - scale Lap; costs something only when they changed."""
-        if self._coefficients == (shift, scale) and self.levels[0].beta is None:
-            return
-        self._coefficients = (shift, scale)
-        for level in self.levels:
-            level.beta = None
-            level.set_coefficients(shift, scale)
-        coarsest = self.levels[-1]
-        self._store_inverse(matrix_of(coarsest, shift, scale, None))
+    def invert_coarsest(self) -> None:
+        """Store the inverse of the coarsest level's operator: launches only; after its numbers change."""
+        level, n = self.levels[-1], self.unknowns
+        layout = level.layout
+        cells, where = layout.nx * layout.ny, [layout.nx, layout.pitch]
+        matrix, other = self._matrices
+        # -1 1^T takes the place of the constant, which a singular operator does not see
+        shift = float(np.prod([1 / h for h in level.h])) / cells if self.singular else 0.0
+        zero = level.b
+        for f in zero:
+            f.zero_()
+        for column in range(n):
+            for component, f in enumerate(level.x):
+                dense.unit.launch(cells, self.device, [column - component * cells, *where], [f])
+            level.fill(level.x)
+            level.residual(zero, level.x, level.r)
+            level.fill(level.r)
+            for component, f in enumerate(level.r):
+                inputs = [f, column, component * cells, n, *where, shift]
+                dense.store_column.launch(cells, self.device, inputs, [matrix])
+        for pivot in range(n):
+            dense.eliminate.launch(n, self.device, [matrix, pivot, n], [other])
+            matrix, other = other, matrix
+        self.inverse = matrix
 
-    def set_beta(self, beta_x: np.ndarray, beta_y: np.ndarray) -> None:
-        """Take the operator -div (beta grad).
+    def plan_sweeps(self, low: float, high: float, scale: float, tolerance: float) -> Solve | None:
+        """The Chebyshev sweeps that leave at most `tolerance` of any b, or None where cycles cost less.
 
-        `beta_x` (ny, nx + 1) on x-faces and `beta_y` (ny + 1, nx) on y-faces, positive. Coarser
-        levels take the mean of the faces that a coarse face covers.
+        `low` and `high` bound the eigenvalues of M^-1 A; `scale` is what the sweeps' rates carry of M.
         """
-        self._coefficients = None
-        for index, level in enumerate(self.levels):
-            if index:
-                ratio = self.levels[index - 1].layout
-                beta_x = coarse_faces(beta_x, ratio.nx, level.layout.nx, ratio.ny, level.layout.ny)
-                beta_y = coarse_faces(beta_y.T, ratio.ny, level.layout.ny, ratio.nx, level.layout.nx).T
-            level.beta = tuple(face_field(level.layout, beta, self.device) for beta in (beta_x, beta_y))
-            level.set_coefficients(0.0, 1.0)
-        self._store_inverse(matrix_of(self.levels[-1], 0.0, 1.0, (beta_x, beta_y)))
-
-    def _store_inverse(self, matrix: np.ndarray) -> None:
-        inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True)
-        self.inverse.assign(inverse.ravel())
-
-    def plan(self, tolerance: float) -> Solve:
-        """The cheapest solve that leaves at most `tolerance` of any right-hand side.
-
-        Chebyshev sweeps where the operator is close enough to the identity that few of them do, which
-        they do to the bound of the polynomial; else multigrid.
-        """
-        shift, scale = self._coefficients
-        centre = shift + 2 * scale * sum(h**-2 for h in self.levels[0].h)
-        least = shift / centre
-        sweeps = chebyshev_count(least, 2 - least, tolerance) if least > 0 else SWEEP_LIMIT + 1
+        sweeps = chebyshev_count(low, high, tolerance) if low > 0 else SWEEP_LIMIT + 1
         if sweeps > SWEEP_LIMIT:
-            return Solve("multigrid", chebyshev_count(*CYCLE_INTERVAL, tolerance))
-        factors = chebyshev_factors(least, 2 - least, sweeps)
+            return None
+        factors = chebyshev_factors(low, high, sweeps)
         factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]  # short and long in turn
-        self._rates.assign(np.pad(factors / centre, (0, SWEEP_LIMIT - sweeps)))
+        self._rates.assign(np.pad(factors / scale, (0, SWEEP_LIMIT - sweeps)))
         return Solve("chebyshev", sweeps)
 
-    def solve(self, how: Solve, b: wp.array, x: wp.array) -> None:
-        """X = what `how` makes of b. Fills the ghosts of b and x."""
-        if how.method == "multigrid":
-            self.multigrid(b, x, how.iterations)
-        elif how.method == "chebyshev":
-            self._sweep(b, x, [self._rates[n : n + 1] for n in range(how.iterations)])
-        else:
-            self._sweep(b, x, [self.levels[0].plain] * how.iterations)
+    def plan_cycles(self, tolerance: float) -> Solve:
+        """The fewest cycles that leave at most `tolerance` of any b."""
+        return Solve("multigrid", chebyshev_count(*self.interval, tolerance))
 
     def prepare(self, how: Solve) -> None:
-        """Put the Chebyshev factors of the cycles on the device, before a graph is captured."""
+        """Make ready, before a graph is captured, what a solve keeps on the device."""
         cycles = how.iterations
         if how.method == "multigrid" and cycles not in self._factors:
-            factors = chebyshev_factors(*CYCLE_INTERVAL, cycles) if cycles > 1 else np.ones(1)
+            factors = chebyshev_factors(*self.interval, cycles) if cycles > 1 else np.ones(1)
             self._factors[cycles] = wp.array(factors, dtype=Real, device=self.device)
+        if how.method == "conjugate gradients" and self._conjugate is None:
+            self._conjugate = _ConjugateGradients(self)
 
-    def multigrid(self, b: wp.array, x: wp.array, cycles: int) -> None:
-        """X = `cycles` V-cycles on b, from zero. Fills the ghosts of b and x."""
+    def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None = None) -> None:
+        """X = what `how` makes of b. Fills the ghosts of b and x.
+
+        Conjugate gradients stop when what x misses is `tolerance` of x, and of `whole` where given.
+        """
+        self.prepare(how)
+        self.levels[0].fill(b)
+        if how.method == "multigrid":
+            self._cycles(b, x, how.iterations)
+        elif how.method == "conjugate gradients":
+            self._conjugate.solve(how, b, x, whole)
+        elif how.method == "chebyshev":
+            rates = [self._rates[n : n + 1] for n in range(how.iterations)]
+            self.levels[0].smooth_from_zero(b, rates, self.spare, x)
+        else:
+            rates = [self.levels[0].plain] * how.iterations
+            self.levels[0].smooth_from_zero(b, rates, self.spare, x)
+
+    def _cycles(self, b: Vector, x: Vector, cycles: int) -> None:
+        """X = `cycles` V-cycles on b, from zero."""
         top = self.levels[0]
-        self.prepare(Solve("multigrid", cycles))
         factors = self._factors[cycles]
-        top.ghosts.fill(b)
         at, other = (x, self.spare) if cycles % 2 else (self.spare, x)
         for cycle in range(cycles):
             left = b
             if cycle:
                 at, other = other, at
                 top.residual(b, other, self.left)
-                top.ghosts.fill(self.left)
+                top.fill(self.left)
                 left = self.left
-            self._cycle(0, left, self.correction)
-            inputs = [other if cycle else self.zero, self.correction, factors[cycle : cycle + 1]]
-            relaxation.add_scaled.launch(top.layout, self.device, inputs, [at])
-            top.ghosts.fill(at)
+            self.cycle(left, self.correction)
+            start, factor = other if cycle else self.zero, factors[cycle : cycle + 1]
+            for f, e, out in zip(start, self.correction, at, strict=True):
+                relaxation.add_scaled.launch(top.layout, self.device, [f, e, factor], [out])
+            top.fill(at)
 
-    def _sweep(self, b: wp.array, x: wp.array, rates: list[wp.array]) -> None:
-        """X = one Jacobi sweep for each of `rates`, from zero."""
-        top = self.levels[0]
-        top.ghosts.fill(b)
-        at, other = (x, self.spare) if len(rates) % 2 else (self.spare, x)
-        for n, rate in enumerate(rates):
-            top.smooth(b, other if n else self.zero, rate, at)
-            at, other = other, at
-
-    def _cycle(self, depth: int, b: wp.array, out: wp.array) -> None:
+    def cycle(self, b: Vector, out: Vector, depth: int = 0) -> None:
         """Out = one V-cycle on b (with ghosts), from zero; out has ghosts and may be the level's y."""
         level = self.levels[depth]
         if depth == len(self.levels) - 1:
-            layout = level.layout
-            inputs = [self.inverse, b, layout.nx, layout.ny, layout.pitch]
-            relaxation.dense_solve.launch(layout.nx * layout.ny, self.device, inputs, [out])
-            level.ghosts.fill(out)
+            self._solve_coarsest(b, out)
             return
         coarse, between = self.levels[depth + 1], self.transfers[depth]
-        level.smooth_from_zero(b, level.x)
+        level.smooth_from_zero(b, level.rates, level.r, level.x)
         level.residual(b, level.x, level.r)
         between.restrict(level.r, coarse.b)
-        self._cycle(depth + 1, coarse.b, coarse.y)
-        between.prolong_add(level.x, coarse.y, level.y)
-        level.smooth(b, level.y, level.second, level.x)
-        level.smooth(b, level.x, level.first, out)
+        self.cycle(coarse.b, coarse.y, depth + 1)
+        between.prolong_add(level.x, coarse.y, level.r)
+        level.smooth(b, level.r, level.rates[::-1], level.x, out)
 
-    def measure(self, how: Solve, b: wp.array, x: wp.array) -> Residual:
-        """The true residual of a solve."""
+    def _solve_coarsest(self, b: Vector, out: Vector) -> None:
+        level, n = self.levels[-1], self.unknowns
+        layout = level.layout
+        cells, where = layout.nx * layout.ny, [layout.nx, layout.pitch]
+        for component, f in enumerate(b):
+            dense.collect.launch(cells, self.device, [f, component * cells, *where], [self._dense])
+        for component, f in enumerate(out):
+            inputs = [self.inverse, self._dense, component * cells, n, *where]
+            dense.multiply.launch(cells, self.device, inputs, [f])
+        level.fill(out)
+
+    def measure(self, how: Solve, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
+        """The true residual of a solve; `norm_a` is a bound of ||A||."""
         top = self.levels[0]
         top.residual(b, x, self.left)
-        top.ghosts.fill(self.left)
-        top.ghosts.fill(b)
-        return Residual(how.method, how.iterations, norm(self.left, top.layout)[0], norm(b, top.layout)[0])
+        top.fill(self.left)
+        top.fill(b)
+        ran = self._conjugate.ran() if how.method == "conjugate gradients" else how.iterations
+        left, right, answer = (norm(f, top.layout) for f in (self.left, b, x))
+        return Residual(how.method, ran, left, right, norm_a * answer)
 
 
-def norm(f: wp.array, layout: Layout) -> tuple[float, float]:
-    """Euclidean norm and largest absolute value of f over its cells."""
-    squares, largest = (wp.empty(layout.ny, dtype=Real, device=f.device) for _ in range(2))
-    measure.row_norms.launch(layout.ny, f.device, [f, layout.nx, layout.pitch], [squares, largest])
-    return float(np.sqrt(squares.numpy().sum(dtype=np.float64))), float(largest.numpy().max())
+class _ConjugateGradients:
+    """Conjugate gradients preconditioned by one cycle of a system, with everything they keep."""
+
+    def __init__(self, system: LinearSystem):
+        self.system, self.device = system, system.device
+        self.layout = system.levels[0].layout
+        components = len(system.levels[0].points)
+        self.r, self.z, self.p, self.q = (vector(self.layout, self.device, components) for _ in range(4))
+        self._rows = self.layout.ny * components
+        self._products, self._wholes = (
+            wp.zeros(self._rows, dtype=Real, device=self.device) for _ in range(2)
+        )
+        numbers = wp.zeros(4, dtype=Real, device=self.device)
+        self._rz, self._limit, self._length, self._ratio = (numbers[n : n + 1] for n in range(4))
+        counts = wp.zeros(2, dtype=wp.int32, device=self.device)
+        self._going, self._iterations = counts[0:1], counts[1:2]
+
+    def ran(self) -> int:
+        """Iterations of the last solve."""
+        return int(self._iterations.numpy()[0])
+
+    def _multiply(self, x: Vector, y: Vector, out: wp.array) -> None:
+        """Row sums of x y."""
+        layout = self.layout
+        for n, (f, g) in enumerate(zip(x, y, strict=True)):
+            inputs = [f, g, layout.nx, layout.pitch, n * layout.ny]
+            krylov.row_products.launch(layout.ny, self.device, inputs, [out])
+
+    def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None) -> None:
+        """X = A^-1 b to the tolerance; b with ghosts, x comes with ghosts."""
+        top = self.system.levels[0]
+        for f, r, start in zip(b, self.r, x, strict=True):
+            start.zero_()
+            wp.copy(r, f)
+        self.system.cycle(self.r, self.z)
+        for z, p in zip(self.z, self.p, strict=True):
+            wp.copy(p, z)
+        self._multiply(self.r, self.z, self._products)
+        self._multiply(*((whole, whole) if whole else (self.r, self.z)), self._wholes)
+        inputs = [self._products, self._wholes, self._rows, Real(how.tolerance), how.iterations]
+        krylov.begin.launch(1, self.device, inputs, [self._rz, self._limit, self._going, self._iterations])
+        wp.capture_while(self._going, self._iterate, x=x, most=how.iterations)
+        top.fill(x)
+
+    def _iterate(self, x: Vector, most: int) -> None:
+        top, layout, device = self.system.levels[0], self.layout, self.device
+        top.residual(self.system.zero, self.p, self.q)  # q = -A p
+        top.fill(self.q)
+        self._multiply(self.p, self.q, self._products)
+        krylov.measure_length.launch(1, device, [self._products, self._rows, self._rz], [self._length])
+        for p, q, f, r in zip(self.p, self.q, x, self.r, strict=True):
+            krylov.advance.launch(layout, device, [p, q, self._length], [f, r])
+        top.fill(self.r)
+        self.system.cycle(self.r, self.z)
+        self._multiply(self.r, self.z, self._products)
+        inputs = [self._products, self._rows, self._limit, most]
+        outputs = [self._rz, self._ratio, self._going, self._iterations]
+        krylov.measure_ratio.launch(1, device, inputs, outputs)
+        for z, p in zip(self.z, self.p, strict=True):
+            krylov.turn.launch(layout, device, [z, self._ratio], [p])
+        top.fill(self.p)
+
+
+def norm(x: Vector, layout: Layout) -> float:
+    """Euclidean norm of x over its cells."""
+    return float(np.sqrt(sum(_rows(f, layout)[0].sum(dtype=np.float64) for f in x)))
+
+
+def largest(f: wp.array, layout: Layout) -> float:
+    """Largest absolute value of f over its cells."""
+    return float(_rows(f, layout)[1].max())
+
+
+def _rows(f: wp.array, layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    squares, highest = (wp.empty(layout.ny, dtype=Real, device=f.device) for _ in range(2))
+    measure.row_norms.launch(layout.ny, f.device, [f, layout.nx, layout.pitch], [squares, highest])
+    return squares.numpy(), highest.numpy()

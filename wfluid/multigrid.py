@@ -1,4 +1,4 @@
-"""The multigrid hierarchy: a level's grid and coefficients, and the way to the next coarser one.
+"""The multigrid hierarchy: its grids, what a level must be able to do, and the way between two levels.
 
 Jacobi sweeps smooth on every level, the same before and after the coarser level's correction and in
 opposite order; restriction is the prolongation's transpose. So a V-cycle is a symmetric operator. Any
@@ -8,128 +8,180 @@ V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
 
-from wfluid.chebyshev import chebyshev_factors
-from wfluid.kernels import relaxation, transfer
+from wfluid.kernels import transfer
 from wfluid.kernels.cells import HALO, Layout, Real, whole_spans
-from wfluid.state import field
+from wfluid.state import Vector, field, vector
 from wfluid.walls import Ghosts, Rule, ghost_table
 
-SMOOTHED = 0.45
-"""Least eigenvalue of D^-1 A that the sweeps damp; what lies below is smooth and left to the coarser
-level. Measured at 256 x 256: three cycles leave 2.3e-4 to 3.0e-4 for any value from 0.3 to 0.6."""
+COARSEST = 16
+"""Cells that the coarsest level may have; there a stored inverse solves exactly."""
 
 
 @dataclass(frozen=True)
 class Points:
-    """Which points of a grid a system's unknowns are."""
+    """Which points of a grid one component of the unknowns lies on."""
 
-    size: tuple[float, float]
-    """Width and height of the domain."""
     rules: tuple[Rule, Rule]
     """Continuation beyond the edges along x and y."""
     on_faces: tuple[bool, bool] = (False, False)
     """Whether they lie on faces (at i h) instead of centres (at (i + 1/2) h) along x and y."""
 
 
-class Level:
-    """One grid of the hierarchy: its scratch fields, its coefficients, the way to the coarser one."""
+class Level(ABC):
+    """One grid of the hierarchy with an operator A on it: scratch vectors, ghosts, sweeps.
 
-    def __init__(self, nx: int, ny: int, points: Points, device: wp.Device):
+    A subclass is an equation. Its sweeps are x + rate M^-1 (b - A x) with a diagonal M of its own.
+    """
+
+    rates: Sequence[wp.array]
+    """Damping of the sweeps on the way down, in device memory; on the way up in opposite order."""
+    plain: wp.array
+    """Damping of the paper's plain Jacobi sweeps."""
+
+    def __init__(
+        self, nx: int, ny: int, size: tuple[float, float], points: Sequence[Points], device: wp.Device
+    ):
         self.layout = Layout(nx, ny)
-        self.h = (points.size[0] / nx, points.size[1] / ny)
+        self.device = device
+        self.h = (size[0] / nx, size[1] / ny)
         self.points = points
-        self.ghosts = Ghosts(self.layout, points.rules, device)
-        self.b, self.x, self.y, self.r = (field(self.layout, device) for _ in range(4))
-        self.beta: tuple[wp.array, wp.array] | None = None
-        # in device memory, so that dt may change under a captured graph
-        self._numbers = wp.zeros(8, dtype=Real, device=device)
-        self.centre, self.ax, self.ay, self.own, self.near, self.first, self.second, self.plain = (
-            self._numbers[n : n + 1] for n in range(8)
-        )
+        self.ghosts = [Ghosts(self.layout, component.rules, device) for component in points]
+        self.b, self.x, self.y, self.r = (vector(self.layout, device, len(points)) for _ in range(4))
 
-    def set_coefficients(self, shift: float, scale: float) -> None:
-        """Take the operator shift - scale Lap."""
-        ax, ay = scale / self.h[0] ** 2, scale / self.h[1] ** 2
-        centre = shift + 2 * ax + 2 * ay
-        least = shift / centre
-        first, second = chebyshev_factors(max(least, SMOOTHED), 2 - least, 2)
-        own, near = (first + second - first * second) / centre, first * second / centre**2
-        if self.beta is None:
-            first, second, plain = first / centre, second / centre, 1 / centre
-        else:
-            plain = 1.0
-        self._numbers.assign(np.array([centre, ax, ay, own, near, first, second, plain]))
+    @abstractmethod
+    def residual(self, b: Vector, x: Vector, out: Vector) -> None:
+        """Out = b - A x; x with ghosts, out without."""
 
-    def smooth(self, b: wp.array, x: wp.array, rate: wp.array, out: wp.array) -> None:
-        """One Jacobi sweep from x to out, both with ghosts; `rate` is `first`, `second` or `plain`."""
-        layout, device = self.layout, out.device
-        if self.beta is None:
-            inputs = [b, x, rate, self.centre, self.ax, self.ay, layout.pitch]
-            relaxation.jacobi.launch(layout, device, inputs, [out])
-        else:
-            inputs = [b, x, *self.beta, rate, self.ax, self.ay, layout.pitch]
-            relaxation.jacobi_beta.launch(layout, device, inputs, [out])
-        self.ghosts.fill(out)
+    @abstractmethod
+    def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
+        """Out = rate M^-1 b, without ghosts: the sweep from zero."""
 
-    def smooth_from_zero(self, b: wp.array, out: wp.array) -> None:
-        """The first two sweeps; b with ghosts."""
-        layout, device = self.layout, out.device
-        if self.beta is None:
-            inputs = [b, self.own, self.near, self.ax, self.ay, layout.pitch]
-            relaxation.first_two_sweeps.launch(layout, device, inputs, [out])
-            self.ghosts.fill(out)
-        else:
-            self.r.zero_()
-            self.smooth(b, self.r, self.first, self.y)
-            self.smooth(b, self.y, self.second, out)
+    @abstractmethod
+    def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
+        """Out = x + rate M^-1 (b - A x); x with ghosts, out without."""
 
-    def residual(self, b: wp.array, x: wp.array, out: wp.array) -> None:
-        """Out = b - A x; x with ghosts."""
-        layout, device = self.layout, out.device
-        if self.beta is None:
-            inputs = [b, x, self.centre, self.ax, self.ay, layout.pitch]
-            relaxation.residual.launch(layout, device, inputs, [out])
-        else:
-            inputs = [b, x, *self.beta, self.ax, self.ay, layout.pitch]
-            relaxation.residual_beta.launch(layout, device, inputs, [out])
+    def fill(self, x: Vector) -> None:
+        """Fill the ghosts of x, and zero its faces on walls."""
+        for f, ghosts in zip(x, self.ghosts, strict=True):
+            ghosts.fill(f)
+
+    def smooth_from_zero(self, b: Vector, rates: Sequence[wp.array], spare: Vector, out: Vector) -> None:
+        """One sweep for each of `rates`, from zero; b and out with ghosts."""
+        at, other = (out, spare) if len(rates) % 2 else (spare, out)
+        self.first_sweep(b, rates[0], at)
+        self.fill(at)
+        self.smooth(b, at, rates[1:], other, out)
+
+    def smooth(self, b: Vector, x: Vector, rates: Sequence[wp.array], spare: Vector, out: Vector) -> None:
+        """One sweep for each of `rates`, from x to out; x and `spare` are written over."""
+        for n, rate in enumerate(rates, start=1):
+            to = out if n == len(rates) else spare
+            self.sweep(b, x, rate, to)
+            self.fill(to)
+            x, spare = to, x
 
 
 class Transfer:
     """Restriction from a level to the next coarser one, and prolongation back."""
 
     def __init__(self, fine: Level, coarse: Level, device: wp.Device):
+        self.components = [
+            _Interpolation(fine.layout, coarse.layout, points, device) for points in fine.points
+        ]
         self.fine, self.coarse = fine, coarse
-        self.between = field(Layout(fine.layout.nx, coarse.layout.ny), device)
+
+    def restrict(self, r: Vector, out: Vector) -> None:
+        """Out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
+        for component, f, to in zip(self.components, r, out, strict=True):
+            component.restrict(f, to)
+        self.coarse.fill(out)
+
+    def prolong_add(self, x: Vector, e: Vector, out: Vector) -> None:
+        """Out = x + the interpolated e; e with ghosts."""
+        for component, f, correction, to in zip(self.components, x, e, out, strict=True):
+            component.prolong_add(f, correction, to)
+        self.fine.fill(out)
+
+
+class _Interpolation:
+    """Linear interpolation of one component from a coarse to a fine grid, and its transpose."""
+
+    def __init__(self, fine: Layout, coarse: Layout, points: Points, device: wp.Device):
+        self.fine, self.coarse, self.device = fine, coarse, device
+        self.strip = Layout(fine.nx, coarse.ny)
+        self.between = field(self.strip, device)
         x, y = (
             _interpolation(n, m, rule, on_faces)
             for n, m, rule, on_faces in zip(
-                _shape(fine), _shape(coarse), fine.points.rules, fine.points.on_faces, strict=True
+                (fine.nx, fine.ny), (coarse.nx, coarse.ny), points.rules, points.on_faces, strict=True
             )
         )
-        self.down_x, self.down_y = (_transposed(*axis, device) for axis in (x, y))
+        self.down_x, self.down_y = (collecting(_transposed(*axis), device) for axis in (x, y))
         self.up_x, self.up_y = (_padded(axis[0] + HALO, axis[1], device) for axis in (x, y))
 
     def restrict(self, r: wp.array, out: wp.array) -> None:
-        """Out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
-        fine, coarse, device = self.fine.layout, self.coarse.layout, out.device
-        strip = Layout(fine.nx, coarse.ny)
-        transfer.restrict_y.launch(strip, device, [r, *self.down_y, fine.pitch], [self.between])
-        transfer.restrict_x.launch(coarse, device, [self.between, *self.down_x, strip.pitch], [out])
-        self.coarse.ghosts.fill(out)
+        collect(self.fine, self.coarse, r, self.between, out, self.down_x, self.down_y)
 
     def prolong_add(self, x: wp.array, e: wp.array, out: wp.array) -> None:
-        """Out = x + the interpolated e; e with ghosts."""
-        fine, coarse, device = self.fine.layout, self.coarse.layout, out.device
-        strip = Layout(fine.nx, coarse.ny)
-        inputs = [e, *self.up_x, coarse.pitch]
-        transfer.prolong_x.launch(strip, device, inputs, [self.between], rows=(-1, coarse.ny + 1))
-        transfer.prolong_y_add.launch(fine, device, [x, self.between, *self.up_y, strip.pitch], [out])
-        self.fine.ghosts.fill(out)
+        inputs, rows = [e, *self.up_x, self.coarse.pitch], (-1, self.coarse.ny + 1)
+        transfer.prolong_x.launch(self.strip, self.device, inputs, [self.between], rows=rows)
+        inputs = [x, self.between, *self.up_y, self.strip.pitch]
+        transfer.prolong_y_add.launch(self.fine, self.device, inputs, [out])
+
+
+class Averaging:
+    """Means of a coefficient on the next coarser grid: over the area that a coarse point stands for.
+
+    Along an axis on whose faces it lies, that is weighted like a hat, as the correction is interpolated:
+    the coarse operator then has the fine one's energy, which plain means of faces overestimate by any
+    factor where the coefficient jumps.
+    """
+
+    def __init__(
+        self,
+        fine: Layout,
+        coarse: Layout,
+        device: wp.Device,
+        on_faces: tuple[bool, bool] = (False, False),
+        periodic: tuple[bool, bool] = (False, False),
+    ):
+        self.fine, self.coarse = fine, coarse
+        self.between = field(Layout(fine.nx, coarse.ny), device)
+        self.down_x, self.down_y = (
+            collecting(_hats(n, m, wraps) if faces else _means(n, m), device)
+            for n, m, faces, wraps in zip(
+                (fine.nx, fine.ny), (coarse.nx, coarse.ny), on_faces, periodic, strict=True
+            )
+        )
+
+    def average(self, f: wp.array, out: wp.array) -> None:
+        """Out = the means of f, without ghosts."""
+        collect(self.fine, self.coarse, f, self.between, out, self.down_x, self.down_y)
+
+
+def collect(
+    fine: Layout, coarse: Layout, f: wp.array, between: wp.array, out: wp.array, down_x, down_y
+) -> None:
+    """Weighted sums of at most 4 x 4 points of f, by the tables of both axes (`collecting`)."""
+    strip, device = Layout(fine.nx, coarse.ny), out.device
+    transfer.restrict_y.launch(strip, device, [f, *down_y, fine.pitch], [between])
+    transfer.restrict_x.launch(coarse, device, [between, *down_x, strip.pitch], [out])
+
+
+def hierarchy(nx: int, ny: int, size: tuple[float, float]) -> list[tuple[int, int]]:
+    """Cells of every grid, from nx by ny down to `COARSEST` cells."""
+    grids = [(nx, ny)]
+    while grids[-1][0] * grids[-1][1] > COARSEST:
+        grids.append(coarser(*grids[-1], size))
+    return grids
 
 
 def coarser(nx: int, ny: int, size: tuple[float, float]) -> tuple[int, int]:
@@ -138,13 +190,9 @@ def coarser(nx: int, ny: int, size: tuple[float, float]) -> tuple[int, int]:
     Point smoothers damp only what varies along the finer axis when cells are far from square.
     """
     hx, hy = size[0] / nx, size[1] / ny
-    halve_x = nx > 2 and (hx < 1.5 * hy or ny <= 2)
-    halve_y = ny > 2 and (hy < 1.5 * hx or nx <= 2)
+    halve_x = nx > 1 and (hx < 1.5 * hy or ny == 1)
+    halve_y = ny > 1 and (hy < 1.5 * hx or nx == 1)
     return -(-nx // 2) if halve_x else nx, -(-ny // 2) if halve_y else ny
-
-
-def _shape(level: Level) -> tuple[int, int]:
-    return level.layout.nx, level.layout.ny
 
 
 def _interpolation(n: int, m: int, rule: Rule, on_faces: bool):
@@ -159,11 +207,10 @@ def _interpolation(n: int, m: int, rule: Rule, on_faces: bool):
     return before, position - before, ghost_table(m, rule)
 
 
-def _transposed(before: np.ndarray, fraction: np.ndarray, ghosts, device: wp.Device):
+def _transposed(before: np.ndarray, fraction: np.ndarray, ghosts) -> list[dict[int, float]]:
     """The transpose of an interpolation, ghosts folded in, times the ratio of point counts.
 
-    Four tables of points (counted with the halo) that a coarse point collects, and four of their
-    weights.
+    For each coarse point the fine points that it collects, with their weights.
     """
     source, sign = ghosts
     m, n = len(source) - 2 * HALO, len(before)
@@ -173,13 +220,39 @@ def _transposed(before: np.ndarray, fraction: np.ndarray, ghosts, device: wp.Dev
             entry = point + HALO
             if weight * sign[entry] != 0:
                 to = collected[source[entry]]
-                to[i] = to.get(i, 0.0) + weight * sign[entry]
-    points = np.full((4, whole_spans(m)), HALO)
-    weights = np.zeros((4, whole_spans(m)))
+                to[i] = to.get(i, 0.0) + weight * sign[entry] * m / n
+    return collected
+
+
+def _means(n: int, m: int) -> list[dict[int, float]]:
+    """For each of m cells the cells of n over the same length that it covers, with their parts of it."""
+    edges = np.arange(m + 1) * (n / m)
+    covered = []
+    for start, end in pairwise(edges):
+        cells = range(int(np.floor(start + 1e-9)), int(np.ceil(end - 1e-9)))
+        covered.append({i: (min(end, i + 1) - max(start, i)) / (end - start) for i in cells})
+    return covered
+
+
+def _hats(n: int, m: int, periodic: bool) -> list[dict[int, float]]:
+    """For each of m faces the faces of n around it, with the parts that sum to one of a hat."""
+    weights = np.zeros((m, n))
+    for c in range(m):
+        distance = np.abs(np.arange(n) * (m / n) - c)
+        if periodic:
+            distance = np.minimum(distance, m - distance)
+        weights[c] = np.maximum(0.0, 1.0 - distance)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return [{int(i): float(row[i]) for i in np.flatnonzero(row)} for row in weights]
+
+
+def collecting(collected: list[dict[int, float]], device: wp.Device):
+    """Four tables of points (counted with the halo) that a coarse point collects, and four of weights."""
+    room = whole_spans(len(collected))
+    points, weights = np.full((4, room), HALO), np.zeros((4, room))
     for c, terms in enumerate(collected):
         for slot, (i, weight) in enumerate(terms.items()):
-            points[slot, c] = i + HALO
-            weights[slot, c] = weight * m / n
+            points[slot, c], weights[slot, c] = i + HALO, weight
     return (
         *(wp.array(row, dtype=wp.int32, device=device) for row in points),
         *(wp.array(row, dtype=Real, device=device) for row in weights),
@@ -193,51 +266,3 @@ def _padded(before: np.ndarray, fraction: np.ndarray, device: wp.Device):
         wp.array(np.pad(before, (0, room), constant_values=HALO), dtype=wp.int32, device=device),
         wp.array(np.pad(fraction, (0, room)), dtype=Real, device=device),
     )
-
-
-def matrix_of(level: Level, shift: float, scale: float, beta) -> np.ndarray:
-    """The level's operator as a dense symmetric matrix, unknowns row by row."""
-    layout = level.layout
-    nx, ny = layout.nx, layout.ny
-    (source_x, sign_x), (source_y, sign_y) = (
-        ghost_table(n, rule) for n, rule in zip((nx, ny), level.points.rules, strict=True)
-    )
-    beta_x, beta_y = beta if beta is not None else (np.ones((ny, nx + 1)), np.ones((ny + 1, nx)))
-    matrix = np.zeros((nx * ny, nx * ny))
-    for j in range(ny):
-        for i in range(nx):
-            k = j * nx + i
-            matrix[k, k] += shift
-            for side in (0, 1):
-                flow = scale * beta_x[j, i + side] / level.h[0] ** 2
-                entry = i + 2 * side - 1 + HALO
-                matrix[k, k] += flow
-                matrix[k, j * nx + source_x[entry]] -= flow * sign_x[entry]
-                flow = scale * beta_y[j + side, i] / level.h[1] ** 2
-                entry = j + 2 * side - 1 + HALO
-                matrix[k, k] += flow
-                matrix[k, source_y[entry] * nx + i] -= flow * sign_y[entry]
-    on_wall = np.zeros((ny, nx), dtype=bool)
-    on_wall[:, 0] |= level.points.rules[0] is Rule.FACE
-    on_wall[0, :] |= level.points.rules[1] is Rule.FACE
-    matrix[on_wall.ravel(), :] = 0
-    matrix[:, on_wall.ravel()] = 0
-    return matrix
-
-
-def coarse_faces(beta: np.ndarray, n: int, m: int, rows: int, coarse_rows: int) -> np.ndarray:
-    """Coefficients on the m + 1 faces of the coarser level, from (rows, n + 1) finer ones."""
-    at = np.linspace(0, n, m + 1)
-    along = np.stack([np.interp(at, np.arange(n + 1), row) for row in beta])
-    edges = np.linspace(0, rows, coarse_rows + 1)
-    summed = np.vstack([np.zeros(m + 1), np.cumsum(along, axis=0)])
-    at_edges = np.stack([np.interp(edges, np.arange(rows + 1), column) for column in summed.T], axis=1)
-    return np.diff(at_edges, axis=0) / np.diff(edges)[:, None]
-
-
-def face_field(layout: Layout, values: np.ndarray, device: wp.Device) -> wp.array:
-    """Face values (ny or ny + 1, nx or nx + 1) as a field."""
-    padded = np.ones(layout.size)
-    grid = padded[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch)
-    grid[HALO : HALO + values.shape[0], HALO : HALO + values.shape[1]] = values
-    return wp.array(padded, dtype=Real, device=device)

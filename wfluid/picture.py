@@ -20,6 +20,9 @@ TYPES = ("uint8", "uint16", "half", "float")
 LARGEST = 65504.0
 """What an infinite value becomes on reading (the largest half): filters would spread it as NaN."""
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue (Rec. 709)."""
+
 SIDE_LIMIT = 65_535
 """Longest side of a picture [px]: what most formats, and 32-bit indices, allow."""
 
@@ -140,23 +143,59 @@ class Picture:
 
     def resized(self, width: int, height: int) -> Picture:
         """The picture at another size, filtered so that shrinking does not alias."""
-        import OpenImageIO as oiio
-
         if (width, height) == (self.width, self.height):
             return self
-        source = oiio.ImageBuf(np.ascontiguousarray(self.pixels))
-        roi = oiio.ROI(0, width, 0, height, 0, 1, 0, self.pixels.shape[2])
-        result = oiio.ImageBufAlgo.resize(source, roi=roi)
-        if result.has_error:
-            raise PictureError(f"resizing to {width} x {height} failed ({_first_line(result.geterror())})")
-        return self.with_pixels(result.get_pixels(oiio.FLOAT).reshape(height, width, -1))
+        return self.with_pixels(resample(self.pixels, width, height, filter=""))
 
     def with_pixels(self, pixels: np.ndarray) -> Picture:
         """The same kind of picture with other pixels."""
         return replace(self, pixels=pixels)
 
 
-def read_picture(path: str | os.PathLike, colorspace: str = "auto") -> Picture:
+def resample(values: np.ndarray, width: int, height: int, filter: str = "triangle") -> np.ndarray:
+    """Values (rows, columns) or (rows, columns, channels) at another size, without aliasing.
+
+    `filter` is one of OpenImageIO's, widened where it shrinks; "" is its best for pictures, which may
+    overshoot; "triangle" keeps within the range of the values.
+    """
+    import OpenImageIO as oiio
+
+    if values.shape[:2] == (height, width):
+        return values
+    source = oiio.ImageBuf(np.ascontiguousarray(values, dtype=np.float32).reshape(*values.shape[:2], -1))
+    roi = oiio.ROI(0, width, 0, height, 0, 1, 0, source.nchannels)
+    result = oiio.ImageBufAlgo.resize(source, filter, roi=roi)
+    if result.has_error:
+        raise PictureError(f"resizing to {width} x {height} failed ({_first_line(result.geterror())})")
+    return result.get_pixels(oiio.FLOAT).reshape(height, width, *values.shape[2:])
+
+
+def intensity(picture: Picture) -> np.ndarray:
+    """Display intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
+
+    Luminance of the colours as they are shown (Rec. 709 weights; of half and float files, the numbers as
+    they are), what is above the range cut off, times alpha.
+
+    Raises:
+        PictureError: a value that is negative or not finite.
+    """
+    pixels, alpha = picture.pixels, picture.alpha
+    wrong = ~np.isfinite(pixels) | (pixels < 0)
+    if wrong.any():
+        raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
+    opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
+    shown = pixels[..., colours]
+    if alpha is not None:
+        shown = np.divide(shown, opacity[..., None], out=np.zeros_like(shown), where=opacity[..., None] > 0)
+    if picture.dtype not in _LINEAR:
+        shown = colour.to_srgb(shown)
+    weights = LUMINANCE if len(colours) == 3 else (1.0,)
+    grey = sum(weight * shown[..., channel] for channel, weight in enumerate(weights))
+    return np.clip(grey, 0.0, 1.0) * opacity
+
+
+def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
     """Read a still in any format that OpenImageIO reads; of several in one file, the first.
 
     `colorspace` says what the numbers are: "srgb", "linear", or "auto": sRGB for integers, linear for
@@ -203,6 +242,8 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto") -> Picture:
     if alpha is not None and spec.get_int_attribute("oiio:UnassociatedAlpha"):
         colours = [channel for channel in range(spec.nchannels) if channel != alpha]
         pixels[..., colours] *= pixels[..., [alpha]]
+    if exact and not np.isfinite(pixels).all():
+        raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
     pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
     upright = _UPRIGHT.get(spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
     return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec)

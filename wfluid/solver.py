@@ -2,8 +2,8 @@
 
     v1 = v0 + dt f                           forces
     v2(x) = v1(foot of x)                    advection
-    (1 - dt mu Lap) v3 = v2                  diffusion, implicit Euler
-    v4 = v3 - grad q,  Lap q = div v3        projection
+    v3 - dt div (2 mu S) + dt alpha v3 = v2  diffusion and drag, implicit Euler, S the strain of v3
+    v4 = v3 - beta grad q,  div beta grad q = div v3,  beta = 1 / (1 + dt alpha)      projection
 
 The foot is traced through v0, which is free of divergence, and carries the map along: v1 is not, and
 would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1; the two differ by
@@ -23,15 +23,17 @@ import numpy as np
 import warp as wp
 
 from wfluid.device import capture, exclusive, load_kernels
+from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
 from wfluid.forces import FORCE_LIMIT, GaussianForce
 from wfluid.grid import Grid
-from wfluid.kernels import advection, projection, relaxation, transport
+from wfluid.kernels import advection, projection, transport
 from wfluid.kernels import forces as force_kernels
 from wfluid.kernels.cells import Layout, Real
-from wfluid.linear import LinearSystem, Residual, Solve, norm
-from wfluid.multigrid import Points
-from wfluid.state import State, field, from_numpy
+from wfluid.linear import Residual
+from wfluid.medium import Medium
+from wfluid.projection import Projection
+from wfluid.state import State, Vector, from_numpy, vector, where
 from wfluid.walls import Ghosts
 
 STEP_LIMIT = 10.0
@@ -73,27 +75,22 @@ class Solver:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        walls, size, shape = fluid.walls, (grid.width, grid.height), (grid.nx, grid.ny)
+        walls = fluid.walls
         self._velocity_ghosts = [
             Ghosts(self.layout, rules, device) for rules in (walls.u_rules(), walls.v_rules())
         ]
         self._d_x_ghosts = Ghosts(self.layout, walls.moved_x_rules(), device)
         self._d_y_ghosts = Ghosts(self.layout, walls.moved_y_rules(), device)
-        self._pressure = LinearSystem(*shape, Points(size, walls.centre_rules()), device)
-        self._pressure.set_coefficients(0.0, 1.0)
-        self._solve_pressure = self._how(Solve("multigrid", fluid.pressure_cycles))
-        self._pressure.prepare(self._solve_pressure)
-        self._solve_diffusion = Solve("none", 0)
+        self._medium = None if fluid.separable else Medium(grid, fluid, device)
         self._diffusion = (
-            LinearSystem(*shape, Points(size, walls.u_rules(), (True, False)), device),
-            LinearSystem(*shape, Points(size, walls.v_rules(), (False, True)), device),
+            CoupledDiffusion(fluid, self._medium, device)
+            if self._medium
+            else SeparateDiffusion(grid, fluid, device)
         )
-        self._foot_x, self._foot_y, self._q, self._minus_div = (field(self.layout, device) for _ in range(4))
-        self._pushed, self._carried, self._diffused, self._change, self._answer = (
-            (field(self.layout, device), field(self.layout, device)) for _ in range(5)
-        )
-        self._inverse_h = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
-        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._projection = Projection(grid, fluid, self._medium if fluid.freeze else None, device)
+        self._foot_x, self._foot_y = vector(self.layout, device, 2)
+        self._pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
+        self._preparation: wp.Graph | None = None
         self._controls: dict[int, _Controls] = {}
         self._graphs: dict[tuple, tuple[list[list[wp.Graph]], State, State]] = {}
         threads = not device.is_cuda and (os.cpu_count() or 1) > 1 and grid.nx * grid.ny >= SIDE_BY_SIDE
@@ -154,30 +151,49 @@ class Solver:
         until: float,
     ) -> list[list[wp.Graph]]:
         """The step's graphs, captured at first, with its numbers put where they read them."""
-        diffuses = self.fluid.viscosity * dt > 0
         controls = self._controls_for(len(forces))
         controls.set(self.grid, forces, t, dt, until)
-        if diffuses:
-            self._plan_diffusion(dt)
-        key = (id(state_in), id(state_out), len(forces), diffuses and self._solve_diffusion)
+        plan = self._plan(until, dt)
+        key = (id(state_in), id(state_out), len(forces), plan)
         if key not in self._graphs:
-            stages = self._stages(state_in, state_out, controls, diffuses)
+            stages = self._stages(state_in, state_out, controls)
             graphs = [[capture(self.device, work) for work in stage] for stage in stages]
             self._graphs[key] = (graphs, state_in, state_out)
             if len(self._graphs) > GRAPHS_KEPT:
                 del self._graphs[next(iter(self._graphs))]
         return self._graphs[key][0]
 
+    def _plan(self, t: float, dt: float) -> tuple:
+        """Make diffusion and projection ready for a step of dt that ends at t; how they will solve."""
+        medium = self._medium
+        if not medium:
+            return self._diffusion.plan(dt), self._projection.how
+        if medium.follow(t, dt):
+            self._solves = self._diffusion.plan(dt), self._projection.plan(dt)
+            if not self.fluid.viscosity_moves:
+                self._prepare()
+        return self._solves
+
+    def _prepare(self) -> None:
+        """Bring what depends on the medium up to date, as one graph."""
+        if self._preparation is None:
+            self._preparation = capture(self.device, self._follow_medium)
+        wp.capture_launch(self._preparation)
+
+    def _follow_medium(self, state: State | None = None) -> None:
+        """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""
+        if state:
+            self._medium.carry(state)
+        self._medium.spread()
+        self._diffusion.prepare()
+        if self.fluid.freeze:
+            self._projection.prepare()
+
     @exclusive
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
-        pressure = self._pressure.measure(self._solve_pressure, self._minus_div, self._q)
-        divergence = norm(self._pressure.left, self.layout)[1]
-        if self._solve_diffusion.iterations:
-            diffusion = self._diffusion[0].measure(self._solve_diffusion, self._change[0], self._answer[0])
-        else:
-            diffusion = Residual("none", 0, 0.0, 0.0)
-        return SolveReport(pressure, diffusion, divergence)
+        pressure, divergence = self._projection.measure()
+        return SolveReport(pressure, self._diffusion.measure(), divergence)
 
     @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
@@ -189,18 +205,27 @@ class Solver:
         self._carry_map(state_in, state_out)
 
     @exclusive
-    def diffuse(self, state_in: State, state_out: State, dt: float) -> None:
-        """Only diffuse the velocity for dt; the map of `state_out` is untouched."""
+    def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
+        """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
-        self._plan_diffusion(dt)
-        for axis, (f, out) in enumerate(((state_in.u, state_out.u), (state_in.v, state_out.v))):
-            self._diffuse(axis, f)
-            wp.copy(out, self._diffused[axis])
+        self._plan(t + dt, dt)
+        if self.fluid.viscosity_moves:
+            self._follow_medium(state_in)
+        velocity = (state_in.u, state_in.v)
+        if self._medium:
+            self._diffusion.diffuse(velocity)
+        elif self._diffuses:
+            for axis, f in enumerate(velocity):
+                self._diffusion.diffuse(axis, f)
+        diffused = self._diffusion.out if self._diffuses else velocity
+        for f, out in zip(diffused, (state_out.u, state_out.v), strict=True):
+            wp.copy(out, f)
 
     @exclusive
-    def project(self, state_in: State, state_out: State) -> None:
-        """Only project the velocity; the map of `state_out` is untouched."""
+    def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
+        """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
+        self._plan(0.0, dt)
         self._project((state_in.u, state_in.v), state_out)
 
     def _check(self, *states: State) -> None:
@@ -214,42 +239,47 @@ class Solver:
             self._controls[forces] = _Controls(forces, self.device)
         return self._controls[forces]
 
-    def _how(self, wanted: Solve) -> Solve:
-        """The solve wanted, or the paper's."""
-        return wanted if self.fluid.solver == "multigrid" else Solve("jacobi", self.fluid.sweeps)
-
-    def _plan_diffusion(self, dt: float) -> None:
-        for system in self._diffusion:
-            system.set_coefficients(1.0, dt * self.fluid.viscosity)
-            self._solve_diffusion = self._how(system.plan(self.fluid.diffusion_tolerance))
-            system.prepare(self._solve_diffusion)
-
     def _stages(
-        self, state_in: State, state_out: State, controls: _Controls, diffuses: bool
+        self, state_in: State, state_out: State, controls: _Controls
     ) -> list[list[Callable[[], None]]]:
         """The step as stages, one after the other, of works that may run side by side."""
         v1 = self._pushed if controls.count else (state_in.u, state_in.v)
         v2 = self._carried
-        v3 = self._diffused if diffuses else v2
+        v3 = self._diffusion.out if self._diffuses else v2
 
         def begin() -> None:
+            if self.fluid.viscosity_moves:
+                self._follow_medium(state_in)
             self._trace(state_in, controls)
             self._push(state_in, controls)
 
         def component(axis: int) -> None:
             self._advect(axis, v1[axis])
-            if diffuses:
-                self._diffuse(axis, v2[axis])
+            if self._medium:
+                self._subtract_pressure(axis, state_in, controls)
+            elif self._diffuses:
+                self._diffusion.diffuse(axis, v2[axis])
+
+        def rest() -> None:
+            if self._medium:
+                self._diffusion.diffuse(self._pushed)
+            self._project(v3, state_out)
+            if self._medium:
+                self._projection.add_pressure(state_in.p, controls.inverse_dt, state_out.p)
 
         return [
             [begin],
             [partial(component, 0), partial(component, 1)],
-            [partial(self._project, v3, state_out), partial(self._carry_map, state_in, state_out)],
+            [rest, partial(self._carry_map, state_in, state_out)],
         ]
 
+    @property
+    def _diffuses(self) -> bool:
+        """Whether the step planned last has a diffusion at all."""
+        return self._diffusion.how.iterations > 0
+
     def _where(self) -> list[int]:
-        periodic_x, periodic_y = self.fluid.walls.periodic
-        return [self.grid.nx, self.grid.ny, int(periodic_x), int(periodic_y), self.layout.pitch]
+        return where(self.grid, self.fluid.walls, self.layout)
 
     def _trace(self, state: State, controls: _Controls) -> None:
         trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
@@ -282,28 +312,17 @@ class Solver:
         advect.launch(self.layout, self.device, inputs, [self._carried[axis]])
         self._velocity_ghosts[axis].fill(self._carried[axis])
 
-    def _diffuse(self, axis: int, f: wp.array) -> None:
-        """Diffused = f + the solution of A change = f - A f, for one component.
-
-        Solving for the change keeps uniform motion exact and makes the solver's residual one of the
-        change, not of the velocity; with a symmetric solver M the adjoint is 1 + (1 - A) M.
-        """
-        system, change, answer = self._diffusion[axis], self._change[axis], self._answer[axis]
-        system.levels[0].residual(f, f, change)
-        system.solve(self._solve_diffusion, change, answer)
-        inputs, out = [f, answer, self._one], self._diffused[axis]
-        relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
+    def _subtract_pressure(self, axis: int, state: State, controls: _Controls) -> None:
+        """Pushed = the carried component without the gradient of the pressure known so far."""
+        before, dt_h = ((1, controls.dt_hx), (self.layout.pitch, controls.dt_hy))[axis]
+        inputs, out = [self._carried[axis], state.p, dt_h, before], self._pushed[axis]
+        projection.subtract_slope.launch(self.layout, self.device, inputs, [out])
         self._velocity_ghosts[axis].fill(out)
 
-    def _project(self, velocity: tuple[wp.array, wp.array], state_out: State) -> None:
-        x, y = self._inverse_h[0:1], self._inverse_h[1:2]
-        pitch = self.layout.pitch
-        inputs = [*velocity, x, y, pitch]
-        projection.minus_divergence.launch(self.layout, self.device, inputs, [self._minus_div])
-        self._pressure.solve(self._solve_pressure, self._minus_div, self._q)
-        inputs = [*velocity, self._q, x, y, pitch]
-        projection.subtract_gradient.launch(self.layout, self.device, inputs, [state_out.u, state_out.v])
-        for f, ghosts in zip((state_out.u, state_out.v), self._velocity_ghosts, strict=True):
+    def _project(self, velocity: Vector, state_out: State) -> None:
+        out = (state_out.u, state_out.v)
+        self._projection.project(velocity, out)
+        for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
             ghosts.fill(f)
 
 
@@ -313,10 +332,10 @@ class _Controls:
     def __init__(self, count: int, device: wp.Device):
         self.count = count
         self.device = device
-        self.numbers = wp.zeros(2 + _PER_FORCE * max(count, 1), dtype=Real, device=device)
-        self.dt_hx, self.dt_hy = self.numbers[0:1], self.numbers[1:2]
+        self.numbers = wp.zeros(3 + _PER_FORCE * max(count, 1), dtype=Real, device=device)
+        self.dt_hx, self.dt_hy, self.inverse_dt = (self.numbers[n : n + 1] for n in range(3))
         self.center_x, self.center_y, self.radius, self.impulse_x, self.impulse_y = (
-            self.numbers[2 + n * count : 2 + (n + 1) * count] if count else None for n in range(_PER_FORCE)
+            self.numbers[3 + n * count : 3 + (n + 1) * count] if count else None for n in range(_PER_FORCE)
         )
         self._profiles: tuple[wp.array, ...] | None = None
 
@@ -330,7 +349,7 @@ class _Controls:
                     f"the force at {force.center} would add a velocity of {gained:g} between {t:g} s and "
                     f"{until:g} s; the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
                 )
-        numbers = [dt / grid.hx, dt / grid.hy]
+        numbers = [dt / grid.hx, dt / grid.hy, 1 / dt if dt > 0 else 0.0]
         numbers += [force.center[0] for force in forces]
         numbers += [force.center[1] for force in forces]
         numbers += [force.radius for force in forces]

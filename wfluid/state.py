@@ -9,11 +9,26 @@ import warp as wp
 
 from wfluid.grid import Grid
 from wfluid.kernels.cells import HALO, Layout, Real
+from wfluid.walls import Walls
+
+Vector = tuple[wp.array, ...]
+"""One field a component: (q,) of a scalar, (u, v) of a velocity."""
 
 
 def field(layout: Layout, device: wp.Device) -> wp.array:
     """A new field of zeros."""
     return wp.zeros(layout.size, dtype=Real, device=device)
+
+
+def vector(layout: Layout, device: wp.Device, components: int) -> Vector:
+    """New fields of zeros, one a component."""
+    return tuple(field(layout, device) for _ in range(components))
+
+
+def where(grid: Grid, walls: Walls, layout: Layout) -> list[int]:
+    """What programs that look values up need to know: cells, which axes wrap, and the pitch."""
+    periodic_x, periodic_y = walls.periodic
+    return [grid.nx, grid.ny, int(periodic_x), int(periodic_y), layout.pitch]
 
 
 def to_numpy(f: wp.array, layout: Layout, extra: tuple[int, int] = (0, 0)) -> np.ndarray:
@@ -34,7 +49,7 @@ def from_numpy(values: np.ndarray, f: wp.array, layout: Layout) -> None:
 
 @dataclass(frozen=True)
 class State:
-    """Velocity and displacement of a fluid, as device arrays over one `Layout`, ghosts filled."""
+    """Velocity, displacement and pressure of a fluid, as device arrays over one `Layout`, ghosts filled."""
 
     grid: Grid
     """The grid the arrays are on."""
@@ -46,17 +61,19 @@ class State:
     """Displacement (source - x) along x at centres [cells of hx]."""
     d_y: wp.array
     """Displacement (source - y) along y at centres [cells of hy]."""
+    p: wp.array
+    """Pressure at centres [longer side^2/s^2], the next step's first guess; 0 where diffusion needs none."""
 
     @classmethod
     def at_rest(cls, grid: Grid, device: wp.Device) -> State:
         """A still fluid under an untouched picture."""
         layout = Layout(grid.nx, grid.ny)
-        return cls(grid, *(field(layout, device) for _ in range(4)))
+        return cls(grid, *(field(layout, device) for _ in range(5)))
 
     @property
-    def arrays(self) -> tuple[wp.array, wp.array, wp.array, wp.array]:
-        """u, v, d_x, d_y."""
-        return self.u, self.v, self.d_x, self.d_y
+    def arrays(self) -> tuple[wp.array, ...]:
+        """u, v, d_x, d_y, p."""
+        return self.u, self.v, self.d_x, self.d_y, self.p
 
     @property
     def layout(self) -> Layout:

@@ -1,0 +1,79 @@
+"""The projection of a step: v - beta grad q with div (beta grad q) = div v, beta = 1 where nothing drags."""
+
+from __future__ import annotations
+
+import warp as wp
+
+from wfluid.diffusion import FIVE_POINT_INTERVAL, JUMP_LIMIT
+from wfluid.equations import FivePoint, Resisted
+from wfluid.fluid import Fluid
+from wfluid.grid import Grid
+from wfluid.kernels import projection, relaxation
+from wfluid.kernels.cells import Layout, Real
+from wfluid.linear import ITERATION_LIMIT, LinearSystem, Residual, Solve, largest
+from wfluid.medium import Medium
+from wfluid.multigrid import Points, hierarchy
+from wfluid.state import Vector, field
+
+PRESSURE_TOLERANCE = 5e-4
+"""Of conjugate gradients; leaves about as much of the divergence as three cycles."""
+
+
+class Projection:
+    """Takes the divergence out of a velocity."""
+
+    def __init__(self, grid: Grid, fluid: Fluid, medium: Medium | None, device: wp.Device):
+        self.fluid, self.medium, self.device, self.layout = fluid, medium, device, Layout(grid.nx, grid.ny)
+        size, walls = (grid.width, grid.height), fluid.walls
+        if medium:
+            levels = [Resisted(level, size, walls, device) for level in medium.levels]
+        else:
+            points = Points(walls.centre_rules())
+            levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
+            for level in levels:
+                level.set_coefficients(0.0, 1.0)
+        self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL, singular=True)
+        self.how = Solve("multigrid", fluid.pressure_cycles)
+        if fluid.solver == "jacobi":
+            self.how = Solve("jacobi", fluid.sweeps)
+        if not medium:
+            self.prepare()
+        self.system.prepare(self.how)
+        self._q, self._minus_div = ((field(self.layout, device),) for _ in range(2))
+        numbers = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
+        self._inverse_h = [numbers[0:1], numbers[1:2]]
+
+    def plan(self, dt: float) -> Solve:
+        """Choose the solve for the medium's drag and steps of dt. `prepare` must follow."""
+        if self.medium and self.fluid.solver != "jacobi":
+            if self.medium.drag_jump(dt) > JUMP_LIMIT:
+                self.how = Solve("conjugate gradients", ITERATION_LIMIT, PRESSURE_TOLERANCE)
+            else:
+                self.how = Solve("multigrid", self.fluid.pressure_cycles)
+            self.system.prepare(self.how)
+        return self.how
+
+    def prepare(self) -> None:
+        """Follow the medium: launches only."""
+        self.system.invert_coarsest()
+
+    def project(self, velocity: Vector, out: Vector) -> None:
+        """Out = the velocity (with ghosts) without its divergence; out comes without ghosts."""
+        beta, pitch = self.medium.levels[0].beta if self.medium else (), self.layout.pitch
+        inputs = [*velocity, *self._inverse_h, pitch]
+        projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
+        self.system.solve(self.how, self._minus_div, self._q)
+        subtract = projection.subtract_gradient_beta if beta else projection.subtract_gradient
+        inputs = [*velocity, *self._q, *beta, *self._inverse_h, pitch]
+        subtract.launch(self.layout, self.device, inputs, out)
+
+    def add_pressure(self, p: wp.array, inverse_dt: wp.array, out: wp.array) -> None:
+        """Out = the pressure p [longer side^2/s^2] and what the last projection adds to it."""
+        inputs = [p, *self._q, inverse_dt]
+        relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
+        self.system.levels[0].fill((out,))
+
+    def measure(self) -> tuple[Residual, float]:
+        """What the last projection left of the divergence: the residual, and its largest value [1/s]."""
+        residual = self.system.measure(self.how, self._minus_div, self._q)
+        return residual, largest(self.system.left[0], self.layout)
