@@ -7,10 +7,13 @@ A Gaussian force of centre c and radius sigma is g(x) times a vector, with
 so two profiles per axis, at faces and at centres, replace one exponential a cell. Over a step the
 velocity gains g times the force's impulse (its vector integrated over the step by the host, hence
 exact for every envelope and any dt). Beyond `CUT` radii g is below rounding and taken as zero.
+
+A force that a picture paints is a field on the faces, made once, times its impulse. A weight is a
+factor at centres, of which a face takes the mean of its two.
 """
 
 import warp as wp
-from wfluid.kernels.cells import Field, Real, cells, entry, gather, inside, lines
+from wfluid.kernels.cells import Field, Real, Uniform, cells, entry, gather, inside, lines
 
 CUT = wp.constant(Real({"float32": 6.0, "float64": 9.0}[Real.__name__]))
 """Radii after which exp(-r^2/2) is below the rounding of one."""
@@ -69,3 +72,34 @@ def push(
     column = entry(n * nx + wp.min(i, nx - 1))
     wp.atomic_add(u, k, on_u * gather(face_x, column))
     wp.atomic_add(v, k, on_v * gather(centre_x, column))
+
+
+@cells
+def push_field(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    impulse: Uniform,
+    # outputs
+    u: Field,
+):
+    """Add the field f on faces, times the impulse of its envelope [s], to one component, in place."""
+    k = inside(k)
+    u[k] = u[k] + impulse * f[k]
+
+
+@cells
+def push_weighted(
+    i: int,
+    j: int,
+    k: int,
+    gained: Field,
+    weight: Field,
+    before: int,
+    # outputs
+    u: Field,
+):
+    """Add what forces gained [L/s], times a weight at centres k and k - `before`, in place."""
+    k = inside(k)
+    u[k] = u[k] + Real(0.5) * (weight[k] + weight[inside(k - before)]) * gained[k]

@@ -27,6 +27,7 @@ _HOME = {
     "Instantaneous": "forces",
     "Oscillator": "forces",
     "Grid": "grid",
+    "ImageForce": "image_force",
     "LookUp": "look_up",
     "write_animation": "output",
     "Freeze": "painted",

@@ -9,14 +9,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from wfluid.controls import STEP_LIMIT, Force
 from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
 from wfluid.device import open_device
 from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce
 from wfluid.grid import LEAST_CELLS, Grid
 from wfluid.look_up import LookUp, check_look_up
 from wfluid.picture import Picture
-from wfluid.solver import STEP_LIMIT, Solver, SolveReport
+from wfluid.solver import Solver, SolveReport
 
 STEPS_PER_SECOND = 96
 """Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
@@ -130,7 +130,7 @@ class Animation:
     """What is animated."""
     fluid: Fluid
     """What it is made of."""
-    forces: Sequence[GaussianForce]
+    forces: Sequence[Force]
     """What moves it."""
     timeline: Timeline
     """When frames are shown, and how many steps lie between."""
@@ -211,7 +211,7 @@ class Animation:
 def animate(
     picture: Picture,
     fluid: Fluid,
-    forces: Sequence[GaussianForce],
+    forces: Sequence[Force],
     duration: float,
     fps: float = 24.0,
     substeps: int | None = None,

@@ -115,7 +115,23 @@ def _parser() -> Parser:
         "strength; repeatable",
     )
     number = animate.add_argument
-    number("--viscosity", type=float, default=0.001, help="viscosity [longer side^2/s] (0.001)")
+    number(
+        "--viscosity", type=float, help="viscosity [longer side^2/s] (0.001); of white, with an image (0.1)"
+    )
+    number("--viscosity-image", metavar="FILE|self", help="a picture that is bright where the fluid is stiff")
+    number("--viscosity-floor", type=float, help="viscosity where the viscosity image is black (0)")
+    number("--invert-viscosity", action="store_true", help="stiff where the viscosity image is dark")
+    number("--viscosity-moves", action="store_true", help="take the viscosity image along with the picture")
+    number("--freeze", metavar="MASK[:STRENGTH]", help="a mask, white where the picture stays (drag 10000/s)")
+    number("--effect-mask", metavar="MASK", help="a mask, white where the forces act")
+    animate.add_argument(
+        "--force-image",
+        metavar="FILE[:key=value,…]",
+        action="append",
+        default=[],
+        help="a force from a picture or self; keys kind (gradient, contour, vectors), strength [px], radius, "
+        "period, phase, start, end, at; repeatable",
+    )
     number("--cells", type=int, default=256, help="cells along the longer side (256)")
     number("--walls", default="free-slip", help="free-slip, no-slip, periodic, or two of them as X,Y")
     number("--scheme", default="standard", help="standard, or paper: Euler, bilinear, Jacobi, phase 0")
@@ -170,26 +186,32 @@ def run_animate(options: argparse.Namespace) -> int:
     from wfluid.estimate import check_memory
     from wfluid.fluid import Fluid
     from wfluid.output import check_folder, names, open_output
+    from wfluid.painted_options import Paintings, files_of
     from wfluid.picture import Encoding, read_picture
     from wfluid.push import Push
     from wfluid.report import Report, write_report
 
     began = time.perf_counter()
-    fluid = Fluid(
-        viscosity=options.viscosity,
-        walls=options.walls,
-        scheme=options.scheme,
-        solver=options.solver,
-        pressure_cycles=options.pressure_cycles,
-    )
+    settings = {
+        "walls": options.walls,
+        "scheme": options.scheme,
+        "solver": options.solver,
+        "pressure_cycles": options.pressure_cycles,
+        "viscosity_moves": options.viscosity_moves,
+    }
+    if options.viscosity_image is None:
+        _refuse_without_image(options)
+    Fluid(viscosity=0.001 if options.viscosity is None else options.viscosity, **settings)  # before files
     timeline = Timeline(options.duration, options.fps, options.substeps)
     encoding = Encoding(options.type, options.compression, options.quality)
     pushes = [Push.parse(text) for text in options.push]
-    if not pushes:
+    if not pushes and not options.force_image:
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY")
     if options.output is None and not options.preview:
         raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
     taken = {Path(options.picture).resolve(): "the picture itself"}
+    painted = files_of(options.viscosity_image, options.effect_mask, options.freeze, options.force_image)
+    taken |= {Path(name).resolve(): "a picture that is read" for name in painted}
     for flag, written in (
         ("-o", options.output),
         ("--report", options.report),
@@ -203,7 +225,16 @@ def run_animate(options: argparse.Namespace) -> int:
                 raise ValueError(f"{path}: that is {taken[path]}; write to another name")
             taken[path] = f"written by {flag}"
     picture = read_picture(options.picture, options.colorspace)
-    forces = [push.force(picture.width, picture.height, timeline.duration, fluid.scheme) for push in pushes]
+    paintings = Paintings(picture, _say_note if not options.quiet else lambda text: None)
+    viscosity = paintings.viscosity(
+        options.viscosity_image, options.viscosity, options.viscosity_floor or 0.0, options.invert_viscosity
+    )
+    fluid = Fluid(viscosity=viscosity, freeze=paintings.freeze(options.freeze), **settings)
+    weight, duration = paintings.weight(options.effect_mask), timeline.duration
+    forces: list = [
+        push.force(picture.width, picture.height, duration, fluid.scheme, weight) for push in pushes
+    ]
+    forces += [paintings.force(text, duration, fluid.scheme, weight) for text in options.force_image]
     width, height = _size(options, picture)
     animation = Animation(
         picture,
@@ -223,7 +254,7 @@ def run_animate(options: argparse.Namespace) -> int:
         _say_plan(animation, options.output)
         return 0
     if options.preview:
-        return _preview(options.preview, picture, pushes)
+        return _preview(options.preview, picture, pushes, fluid, weight)
     _load(animation, options.quiet)
     report = Report(animation)
     writing = _write_frames(animation, output, report, options.quiet)
@@ -267,13 +298,23 @@ def _say_plan(animation, output: str | None) -> None:
     print(f"writes    {output or 'nothing'}")
 
 
-def _preview(path: str, picture, pushes) -> int:
-    """Write the picture with the pushes drawn on it."""
+def _preview(path: str, picture, pushes, fluid, weight) -> int:
+    """Write the picture with the controls drawn on it."""
     from wfluid.picture import write_picture
     from wfluid.preview import draw_controls
 
-    write_picture(path, draw_controls(picture, pushes))
+    write_picture(path, draw_controls(picture, pushes, fluid.viscosity, fluid.freeze, weight))
     return 0
+
+
+def _refuse_without_image(options: argparse.Namespace) -> None:
+    for flag in ("viscosity_floor", "invert_viscosity", "viscosity_moves"):
+        if getattr(options, flag):
+            raise ValueError(f"--{flag.replace('_', '-')} needs a --viscosity-image")
+
+
+def _say_note(text: str) -> None:
+    print(f"wfluid: note: {text}", file=sys.stderr)
 
 
 def _load(animation, quiet: bool) -> None:

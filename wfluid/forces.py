@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from wfluid.painted import Painted
+
 FORCE_LIMIT = 1e4
 """Largest force the solver is tested with [longer side/s^2]."""
 
@@ -164,6 +166,8 @@ class GaussianForce:
     """Sigma of the Gaussian [longer side]."""
     envelope: Envelope = field(default_factory=Constant)
     """Course in time."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture."""
 
     def __post_init__(self) -> None:
         for name in ("center", "vector"):
@@ -179,6 +183,11 @@ class GaussianForce:
             )
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise ValueError(f"GaussianForce.radius {self.radius}: expected a positive number")
+
+    @property
+    def reach(self) -> float:
+        """Largest acceleration [longer side/s^2], at the center."""
+        return math.hypot(*self.vector)
 
 
 def _finite(name: str, value: float) -> None:

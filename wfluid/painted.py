@@ -33,8 +33,8 @@ class Painted:
     """A quantity painted over the picture: what a picture shows, times a scale.
 
     Raises:
-        ValueError: a value that is negative or not finite, an array that is not two-dimensional, or
-            `invert` of values beyond 0 … 1.
+        ValueError: a value that is negative or not finite, an array that is not two-dimensional,
+            `invert` of values beyond 0 … 1, or a floor above the scale.
     """
 
     picture: Picture | np.ndarray
@@ -43,6 +43,8 @@ class Painted:
     """What full intensity stands for."""
     invert: bool = False
     """Whether dark is much, instead of bright."""
+    floor: float = 0.0
+    """What no intensity stands for."""
     values: np.ndarray = field(init=False, repr=False)
     """What is painted, (height, width) of the painting."""
 
@@ -52,10 +54,14 @@ class Painted:
         if values.ndim != 2 or not values.size:
             raise ValueError(f"painted values of shape {values.shape}: expected (height, width)")
         _finite_from_zero("painted values", values)
-        _finite_from_zero("scale", np.asarray(self.scale))
+        for name in ("scale", "floor"):
+            _finite_from_zero(name, np.asarray(getattr(self, name)))
         if self.invert and values.max() > 1:
             raise ValueError(f"painted values up to {values.max():g} cannot be inverted: expected 0 … 1")
-        object.__setattr__(self, "values", self.scale * (1.0 - values if self.invert else values))
+        shown = 1.0 - values if self.invert else values
+        object.__setattr__(self, "values", self.floor + (self.scale - self.floor) * shown)
+        if self.floor > self.scale:
+            raise ValueError(f"floor {self.floor:g} is above scale {self.scale:g}")
 
     def on(self, grid: Grid) -> np.ndarray:
         """The means over the grid's cells, (ny, nx)."""

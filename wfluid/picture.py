@@ -130,6 +130,8 @@ class Picture:
     """Number type of the file it came from: one of `TYPES`."""
     metadata: Any = None
     """The OpenImageIO `ImageSpec` it came with, for writing."""
+    srgb: bool | None = None
+    """Whether the file's numbers were sRGB; None for what its number type says."""
 
     @property
     def width(self) -> int:
@@ -170,11 +172,26 @@ def resample(values: np.ndarray, width: int, height: int, filter: str = "triangl
     return result.get_pixels(oiio.FLOAT).reshape(height, width, *values.shape[2:])
 
 
-def intensity(picture: Picture) -> np.ndarray:
-    """Display intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
+def as_stored(picture: Picture) -> np.ndarray:
+    """The numbers of the picture's file, integers scaled to 0 … 1, colours not multiplied by alpha."""
+    pixels, alpha = picture.pixels, picture.alpha
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha]
+    stored = pixels.copy()
+    if alpha is not None:
+        opacity = pixels[..., [alpha]]
+        stored[..., colours] = np.divide(
+            pixels[..., colours], opacity, out=np.zeros_like(pixels[..., colours]), where=opacity > 0
+        )
+    if picture.dtype not in _LINEAR if picture.srgb is None else picture.srgb:
+        stored[..., colours] = colour.to_srgb(stored[..., colours])
+    return stored
 
-    Luminance of the colours as they are shown (Rec. 709 weights; of half and float files, the numbers as
-    they are), what is above the range cut off, times alpha.
+
+def intensity(picture: Picture) -> np.ndarray:
+    """Intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
+
+    Luminance of the file's numbers (Rec. 709 weights), which are display values in 8- and 16-bit files;
+    what is above the range is cut off; times alpha.
 
     Raises:
         PictureError: a value that is negative or not finite.
@@ -184,14 +201,11 @@ def intensity(picture: Picture) -> np.ndarray:
     if wrong.any():
         raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
     colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
-    opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
-    shown = pixels[..., colours]
-    if alpha is not None:
-        shown = np.divide(shown, opacity[..., None], out=np.zeros_like(shown), where=opacity[..., None] > 0)
-    if picture.dtype not in _LINEAR:
-        shown = colour.to_srgb(shown)
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)
-    grey = sum(weight * shown[..., channel] for channel, weight in enumerate(weights))
+    stored = as_stored(picture)
+    grey = sum(weight * stored[..., channel] for weight, channel in zip(weights, colours, strict=False))
+    opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
     return np.clip(grey, 0.0, 1.0) * opacity
 
 
@@ -246,7 +260,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
         raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
     pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
     upright = _UPRIGHT.get(spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
-    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec)
+    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec, srgb)
 
 
 def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:

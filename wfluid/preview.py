@@ -8,20 +8,47 @@ from itertools import pairwise
 
 import numpy as np
 
-from wfluid.picture import Picture
+from wfluid.painted import Freeze, Painted, Quantity
+from wfluid.picture import Picture, resample
 from wfluid.push import DEFAULT_RADIUS, Push
 
 COLOURS = ((1.0, 0.75, 0.0), (0.0, 0.8, 1.0), (1.0, 0.2, 0.6), (0.4, 1.0, 0.2))
 """One a push, in turn; linear light."""
 
 
-def draw_controls(picture: Picture, pushes: Iterable[Push]) -> Picture:
-    """The picture with each push's arrow and a circle at its radius (one sigma), in colours in turn."""
+STIFF, FROZEN = (1.0, 0.35, 0.0), (0.0, 0.35, 1.0)
+"""Tints of what viscosity stiffens, by its part of the stiffest, and of what is frozen; linear light."""
+
+_TINT = 0.6
+
+
+def draw_controls(
+    picture: Picture,
+    pushes: Iterable[Push],
+    viscosity: Quantity | None = None,
+    freeze: Freeze | None = None,
+    weight: Painted | None = None,
+) -> Picture:
+    """The picture with each push's arrow and a circle at its radius (one sigma), in colours in turn.
+
+    A painted viscosity and what is frozen are tinted, orange and blue; what an effect mask spares is dark.
+    """
     import OpenImageIO as oiio
 
     height, width, channels = picture.pixels.shape
     colours = picture.pixels[..., :3] if channels >= 3 else np.repeat(picture.pixels[..., :1], 3, axis=2)
-    image = oiio.ImageBuf(np.ascontiguousarray(np.clip(colours, 0, 1) * 0.8))
+    colours = np.clip(colours, 0, 1) * 0.8
+    for painted, tint in (
+        (viscosity if isinstance(viscosity, Painted) else None, STIFF),
+        (freeze.paint if freeze else None, FROZEN),
+    ):
+        if painted is not None and painted.values.max() > 0:
+            part = resample((painted.values / painted.values.max()).astype(np.float32), width, height)
+            colours += _TINT * part[..., None] * (np.array(tint, dtype=np.float32) - colours)
+    if weight is not None:
+        part = resample(np.minimum(weight.values, 1.0).astype(np.float32), width, height)
+        colours *= 0.3 + 0.7 * part[..., None]
+    image = oiio.ImageBuf(np.ascontiguousarray(colours, dtype=np.float32))
     side = max(width, height)
     thick = max(1, side // 400)
 

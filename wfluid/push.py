@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 
 from wfluid.forces import Constant, Envelope, GaussianForce, Instantaneous, Oscillator
+from wfluid.painted import Painted
 
 KEYS = ("radius", "period", "phase", "start", "end", "at", "strength")
 
@@ -50,39 +51,22 @@ class Push:
         parts = text.split(":")
         if len(parts) not in (2, 3):
             raise ValueError(f"push {text!r}: expected X,Y:DX,DY or X,Y:DX,DY:key=value,…")
-        x, y = _pair(text, "the point X,Y", parts[0])
-        dx, dy = _pair(text, "the arrow DX,DY", parts[1])
-        options = {}
-        for item in parts[2].split(",") if len(parts) == 3 else ():
-            key, equals, value = item.partition("=")
-            if not equals or key.strip() not in KEYS:
-                raise ValueError(f"push {text!r}: {item!r} is not key=value with a key of {', '.join(KEYS)}")
-            if key.strip() in options:
-                raise ValueError(f"push {text!r}: {key.strip()} is given twice")
-            options[key.strip()] = _number(text, key.strip(), value)
-        push = cls(x, y, dx, dy, options)
-        push._check(text)
-        return push
+        what = f"push {text!r}"
+        x, y = _pair(what, "the point X,Y", parts[0])
+        dx, dy = _pair(what, "the arrow DX,DY", parts[1])
+        options = parse_options(what, parts[2], KEYS) if len(parts) == 3 else {}
+        if options.get("radius", 1.0) <= 0:
+            raise ValueError(f"{what}: radius {options['radius']:g} is not positive")
+        return cls(x, y, dx, dy, options)
 
-    def _check(self, text: str) -> None:
-        given = self.options
-        if "at" in given and given.keys() & {"period", "phase", "start", "end"}:
-            raise ValueError(f"push {text!r}: at= is one blow; it goes with radius and strength only")
-        if "phase" in given and "period" not in given:
-            raise ValueError(f"push {text!r}: phase= needs period=")
-        if given.get("radius", 1.0) <= 0:
-            raise ValueError(f"push {text!r}: radius {given['radius']:g} is not positive")
-        if given.get("period", 1.0) < LEAST_TIME:
-            raise ValueError(f"push {text!r}: period {given['period']:g}: expected {LEAST_TIME} s or more")
-        for key in ("start", "at"):
-            if given.get(key, 0) < 0:
-                raise ValueError(f"push {text!r}: {key} {given[key]:g} is before the animation")
-        if "end" in given and given["end"] <= given.get("start", 0.0):
-            raise ValueError(
-                f"push {text!r}: end {given['end']:g} is not after start {given.get('start', 0):g}"
-            )
-
-    def force(self, width: int, height: int, duration: float, scheme: str = "standard") -> GaussianForce:
+    def force(
+        self,
+        width: int,
+        height: int,
+        duration: float,
+        scheme: str = "standard",
+        weight: Painted | None = None,
+    ) -> GaussianForce:
         """The force for a picture of width x height pixels and an animation of `duration` seconds.
 
         Raises:
@@ -92,51 +76,89 @@ class Push:
             raise ValueError(
                 f"push at {self.x:g},{self.y:g}: outside the picture of {width} x {height} pixels"
             )
-        envelope, per_length = self._course(duration, scheme)
+        envelope, per_length = course("push", self.options, duration, scheme)
         side = max(width, height)
         factor = _PRESSURE * per_length * self.options.get("strength", 1.0) / side
         radius = self.options.get("radius", DEFAULT_RADIUS * side) / side
         return GaussianForce(
-            (self.x / side, self.y / side), (self.dx * factor, self.dy * factor), radius, envelope
+            (self.x / side, self.y / side), (self.dx * factor, self.dy * factor), radius, envelope, weight
         )
 
-    def _course(self, duration: float, scheme: str) -> tuple[Envelope, float]:
-        """The envelope, and the acceleration (or velocity) that carries a free particle by one."""
-        given = self.options
-        at = given.get("at")
-        if at is not None:
-            if at >= duration:
-                raise ValueError(f"push at={at:g}: the animation lasts {duration:g} s")
-            return Instantaneous(at), 1.0 / (duration - at)
-        start, end = given.get("start", 0.0), given.get("end", duration)
-        if end - start < LEAST_TIME and start < duration:
-            raise ValueError(
-                f"push from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; at= is a blow"
-            )
-        if start >= duration:
-            raise ValueError(f"push start={start:g}: the animation lasts {duration:g} s")
-        if "period" not in given:
-            return Constant(start, end), 2.0 / (end - start) ** 2
-        paper = scheme == "paper"
-        phase = given.get("phase", 0.0 if paper else 0.25)
-        centred = not paper and math.isclose(phase % 0.5, 0.25)
-        period = given["period"]
-        envelope = Oscillator(period=period, phase=phase, start=start, end=end, centred=centred)
-        return envelope, (2 * math.pi / period) ** 2
+
+def course(
+    what: str, given: dict[str, float], duration: float, scheme: str = "standard"
+) -> tuple[Envelope, float]:
+    """The envelope that options say, and the acceleration (or velocity) that carries a free particle by one.
+
+    Raises:
+        ValueError: a window outside the animation.
+    """
+    at = given.get("at")
+    if at is not None:
+        if at >= duration:
+            raise ValueError(f"{what} at={at:g}: the animation lasts {duration:g} s")
+        return Instantaneous(at), 1.0 / (duration - at)
+    start, end = given.get("start", 0.0), given.get("end", duration)
+    if end - start < LEAST_TIME and start < duration:
+        raise ValueError(
+            f"{what} from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; at= is a blow"
+        )
+    if start >= duration:
+        raise ValueError(f"{what} start={start:g}: the animation lasts {duration:g} s")
+    if "period" not in given:
+        return Constant(start, end), 2.0 / (end - start) ** 2
+    paper = scheme == "paper"
+    phase = given.get("phase", 0.0 if paper else 0.25)
+    centred = not paper and math.isclose(phase % 0.5, 0.25)
+    period = given["period"]
+    envelope = Oscillator(period=period, phase=phase, start=start, end=end, centred=centred)
+    return envelope, (2 * math.pi / period) ** 2
 
 
-def _pair(text: str, what: str, part: str) -> tuple[float, float]:
+def parse_options(what: str, text: str, keys: tuple[str, ...], words: tuple[str, ...] = ()) -> dict:
+    """Read "key=value,…"; the values of `words` stay text, the others are numbers.
+
+    Raises:
+        ValueError: an unknown key, one given twice, a value that is no number, or times that contradict.
+    """
+    options: dict = {}
+    for item in text.split(","):
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not equals or key not in keys:
+            raise ValueError(f"{what}: {item!r} is not key=value with a key of {', '.join(keys)}")
+        if key in options:
+            raise ValueError(f"{what}: {key} is given twice")
+        options[key] = value if key in words else _number(what, key, value)
+    _check_course(what, options)
+    return options
+
+
+def _check_course(what: str, given: dict[str, float]) -> None:
+    if "at" in given and given.keys() & {"period", "phase", "start", "end"}:
+        raise ValueError(f"{what}: at= is one blow; it goes without period, phase, start and end")
+    if "phase" in given and "period" not in given:
+        raise ValueError(f"{what}: phase= needs period=")
+    if given.get("period", 1.0) < LEAST_TIME:
+        raise ValueError(f"{what}: period {given['period']:g}: expected {LEAST_TIME} s or more")
+    for key in ("start", "at"):
+        if given.get(key, 0) < 0:
+            raise ValueError(f"{what}: {key} {given[key]:g} is before the animation")
+    if "end" in given and given["end"] <= given.get("start", 0.0):
+        raise ValueError(f"{what}: end {given['end']:g} is not after start {given.get('start', 0):g}")
+
+
+def _pair(what: str, name: str, part: str) -> tuple[float, float]:
     numbers = part.split(",")
     if len(numbers) != 2:
-        raise ValueError(f"push {text!r}: {what} needs two numbers, got {part!r}")
-    return _number(text, what, numbers[0]), _number(text, what, numbers[1])
+        raise ValueError(f"{what}: {name} needs two numbers, got {part!r}")
+    return _number(what, name, numbers[0]), _number(what, name, numbers[1])
 
 
-def _number(text: str, what: str, part: str) -> float:
+def _number(what: str, name: str, part: str) -> float:
     try:
         value = float(part)
     except ValueError:
-        raise ValueError(f"push {text!r}: {what}: {part!r} is not a number") from None
+        raise ValueError(f"{what}: {name}: {part!r} is not a number") from None
     if not math.isfinite(value):
-        raise ValueError(f"push {text!r}: {what}: {part} is not finite")
+        raise ValueError(f"{what}: {name}: {part} is not finite")
     return value

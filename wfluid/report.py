@@ -12,6 +12,8 @@ from typing import Any
 
 from wfluid.animation import Animation, Frame
 from wfluid.files import whole_file
+from wfluid.linear import Residual
+from wfluid.painted import Keyed, Painted, Quantity
 from wfluid.picture import PictureError
 
 
@@ -34,8 +36,8 @@ class Report:
         }
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
-    residual_max: float = 0.0
-    """Largest relative residual of a projection."""
+    solves: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Of projection and diffusion: the methods used, most iterations and largest residuals seen."""
 
     def add(self, frame: Frame) -> None:
         """Take a frame's figures."""
@@ -52,7 +54,20 @@ class Report:
         ):
             seen[name] = max(seen[name], value)
         if frame.solve:
-            self.residual_max = max(self.residual_max, frame.solve.pressure.relative)
+            self._add_solve("projection", frame.solve.pressure)
+            self._add_solve("diffusion", frame.solve.diffusion)
+
+    def _add_solve(self, name: str, left: Residual) -> None:
+        blank = {"methods": [], "iterations_max": 0, "residual_max": 0.0, "backward_error_max": 0.0}
+        seen = self.solves.setdefault(name, blank)
+        if left.method not in seen["methods"]:
+            seen["methods"].append(left.method)
+        for key, value in (
+            ("iterations_max", left.iterations),
+            ("residual_max", left.relative),
+            ("backward_error_max", left.backward),
+        ):
+            seen[key] = max(seen[key], value)
 
     def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
         """The report; `seconds` adds the times that the animation does not know."""
@@ -65,7 +80,9 @@ class Report:
             "fps": animation.timeline.fps,
             "steps": max(self.frames - 1, 0) * animation.timeline.steps_per_frame,
             "settings": {
-                "viscosity": fluid.viscosity,
+                "viscosity": _described(fluid.viscosity),
+                "viscosity_moves": fluid.viscosity_moves,
+                "freeze": fluid.freeze.strength if fluid.freeze else None,
                 "walls": [fluid.walls.x.value, fluid.walls.y.value],
                 "scheme": fluid.scheme,
                 "solver": fluid.solver,
@@ -80,10 +97,19 @@ class Report:
                 **seconds,
             },
             **self.extremes,
-            "pressure_residual_max": self.residual_max,
+            "solves": self.solves,
             "device": str(animation.solver.device.name),
             "versions": versions(),
         }
+
+
+def _described(viscosity: Quantity) -> float | list[float] | str:
+    """A number; the least and the greatest of a painting; or what else it is."""
+    if isinstance(viscosity, Painted):
+        return [float(viscosity.values.min()), float(viscosity.values.max())]
+    return (
+        viscosity if isinstance(viscosity, float) else "keyed" if isinstance(viscosity, Keyed) else "of time"
+    )
 
 
 def versions() -> dict[str, str]:

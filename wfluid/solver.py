@@ -22,31 +22,24 @@ from functools import partial
 import numpy as np
 import warp as wp
 
+from wfluid.controls import STEP_LIMIT, Controls, Force
 from wfluid.device import capture, exclusive, load_kernels
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
-from wfluid.forces import FORCE_LIMIT, GaussianForce
 from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, transport
-from wfluid.kernels import forces as force_kernels
-from wfluid.kernels.cells import Layout, Real
+from wfluid.kernels.cells import Layout
 from wfluid.linear import Residual
 from wfluid.medium import Medium
 from wfluid.projection import Projection
 from wfluid.state import State, Vector, from_numpy, vector, where
 from wfluid.walls import Ghosts
 
-STEP_LIMIT = 10.0
-"""Longest step the solver is tested with [s]."""
-
 GRAPHS_KEPT = 16
 """Pairs of states whose graphs are kept; the oldest goes first."""
 
 SIDE_BY_SIDE = 300 * 300
 """Cells from which on a second thread saves more than it costs to wake it: 1.0x at 256^2, 1.4x at 512^2."""
-
-_PER_FORCE = 5
-"""Numbers of a force on the device: center, radius and impulse."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +84,8 @@ class Solver:
         self._foot_x, self._foot_y = vector(self.layout, device, 2)
         self._pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
         self._preparation: wp.Graph | None = None
-        self._controls: dict[int, _Controls] = {}
-        self._graphs: dict[tuple, tuple[list[list[wp.Graph]], State, State]] = {}
+        self._controls: dict[tuple, Controls] = {}
+        self._graphs: dict[tuple, tuple[list[list[wp.Graph]], State, State, Controls]] = {}
         threads = not device.is_cuda and (os.cpu_count() or 1) > 1 and grid.nx * grid.ny >= SIDE_BY_SIDE
         self._pool = ThreadPoolExecutor(2) if threads else None
 
@@ -113,7 +106,7 @@ class Solver:
         self,
         state_in: State,
         state_out: State,
-        forces: Sequence[GaussianForce],
+        forces: Sequence[Force],
         t: float,
         dt: float,
         *,
@@ -145,20 +138,20 @@ class Solver:
         self,
         state_in: State,
         state_out: State,
-        forces: Sequence[GaussianForce],
+        forces: Sequence[Force],
         t: float,
         dt: float,
         until: float,
     ) -> list[list[wp.Graph]]:
         """The step's graphs, captured at first, with its numbers put where they read them."""
-        controls = self._controls_for(len(forces))
-        controls.set(self.grid, forces, t, dt, until)
+        controls = self._controls_for(forces)
+        controls.set(forces, t, dt, until)
         plan = self._plan(until, dt)
-        key = (id(state_in), id(state_out), len(forces), plan)
+        key = (id(state_in), id(state_out), id(controls), plan)
         if key not in self._graphs:
             stages = self._stages(state_in, state_out, controls)
             graphs = [[capture(self.device, work) for work in stage] for stage in stages]
-            self._graphs[key] = (graphs, state_in, state_out)
+            self._graphs[key] = (graphs, state_in, state_out, controls)
             if len(self._graphs) > GRAPHS_KEPT:
                 del self._graphs[next(iter(self._graphs))]
         return self._graphs[key][0]
@@ -199,8 +192,8 @@ class Solver:
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
         self._check(state_in, state_out)
-        controls = self._controls_for(0)
-        controls.set(self.grid, (), 0.0, dt, dt)
+        controls = self._controls_for(())
+        controls.set((), 0.0, dt, dt)
         self._trace(state_in, controls)
         self._carry_map(state_in, state_out)
 
@@ -226,6 +219,8 @@ class Solver:
         """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
         self._plan(0.0, dt)
+        if self.fluid.viscosity_moves:
+            self._follow_medium(state_in)
         self._project((state_in.u, state_in.v), state_out)
 
     def _check(self, *states: State) -> None:
@@ -234,16 +229,19 @@ class Solver:
             if state.grid != self.grid or state.u.device != self.device:
                 raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
 
-    def _controls_for(self, forces: int) -> _Controls:
-        if forces not in self._controls:
-            self._controls[forces] = _Controls(forces, self.device)
-        return self._controls[forces]
+    def _controls_for(self, forces: Sequence[Force]) -> Controls:
+        key = Controls.key(forces)
+        if key not in self._controls:
+            if len(self._controls) >= GRAPHS_KEPT:
+                del self._controls[next(iter(self._controls))]
+            self._controls[key] = Controls(forces, self.grid, self.fluid.walls, self.device)
+        return self._controls[key]
 
     def _stages(
-        self, state_in: State, state_out: State, controls: _Controls
+        self, state_in: State, state_out: State, controls: Controls
     ) -> list[list[Callable[[], None]]]:
         """The step as stages, one after the other, of works that may run side by side."""
-        v1 = self._pushed if controls.count else (state_in.u, state_in.v)
+        v1 = self._pushed if controls.pushes else (state_in.u, state_in.v)
         v2 = self._carried
         v3 = self._diffusion.out if self._diffuses else v2
 
@@ -281,18 +279,18 @@ class Solver:
     def _where(self) -> list[int]:
         return where(self.grid, self.fluid.walls, self.layout)
 
-    def _trace(self, state: State, controls: _Controls) -> None:
+    def _trace(self, state: State, controls: Controls) -> None:
         trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
         inputs = [state.u, state.v, controls.dt_hx, controls.dt_hy, *self._where()]
         trace.launch(self.layout, self.device, inputs, [self._foot_x, self._foot_y])
         self._d_x_ghosts.fill(self._foot_x)
         self._d_y_ghosts.fill(self._foot_y)
 
-    def _push(self, state: State, controls: _Controls) -> None:
-        if controls.count:
+    def _push(self, state: State, controls: Controls) -> None:
+        if controls.pushes:
             for f, pushed in zip((state.u, state.v), self._pushed, strict=True):
                 wp.copy(pushed, f)
-            controls.push(self.grid, self.fluid, self.layout, *self._pushed)
+            controls.push(self._pushed)
             for pushed, ghosts in zip(self._pushed, self._velocity_ghosts, strict=True):
                 ghosts.fill(pushed)
 
@@ -312,7 +310,7 @@ class Solver:
         advect.launch(self.layout, self.device, inputs, [self._carried[axis]])
         self._velocity_ghosts[axis].fill(self._carried[axis])
 
-    def _subtract_pressure(self, axis: int, state: State, controls: _Controls) -> None:
+    def _subtract_pressure(self, axis: int, state: State, controls: Controls) -> None:
         """Pushed = the carried component without the gradient of the pressure known so far."""
         before, dt_h = ((1, controls.dt_hx), (self.layout.pitch, controls.dt_hy))[axis]
         inputs, out = [self._carried[axis], state.p, dt_h, before], self._pushed[axis]
@@ -324,55 +322,3 @@ class Solver:
         self._projection.project(velocity, out)
         for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
             ghosts.fill(f)
-
-
-class _Controls:
-    """What changes from step to step, in one device array: dt / h and the forces' numbers."""
-
-    def __init__(self, count: int, device: wp.Device):
-        self.count = count
-        self.device = device
-        self.numbers = wp.zeros(3 + _PER_FORCE * max(count, 1), dtype=Real, device=device)
-        self.dt_hx, self.dt_hy, self.inverse_dt = (self.numbers[n : n + 1] for n in range(3))
-        self.center_x, self.center_y, self.radius, self.impulse_x, self.impulse_y = (
-            self.numbers[3 + n * count : 3 + (n + 1) * count] if count else None for n in range(_PER_FORCE)
-        )
-        self._profiles: tuple[wp.array, ...] | None = None
-
-    def set(self, grid: Grid, forces: Sequence[GaussianForce], t: float, dt: float, until: float) -> None:
-        """Put a step of dt, in which forces act from t to `until`, on the device."""
-        impulses = [force.envelope.integral(t, until) for force in forces]
-        for force, impulse in zip(forces, impulses, strict=True):
-            gained = math.hypot(*force.vector) * abs(impulse)
-            if not gained <= FORCE_LIMIT * STEP_LIMIT:
-                raise ValueError(
-                    f"the force at {force.center} would add a velocity of {gained:g} between {t:g} s and "
-                    f"{until:g} s; the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
-                )
-        numbers = [dt / grid.hx, dt / grid.hy, 1 / dt if dt > 0 else 0.0]
-        numbers += [force.center[0] for force in forces]
-        numbers += [force.center[1] for force in forces]
-        numbers += [force.radius for force in forces]
-        numbers += [force.vector[0] * impulse for force, impulse in zip(forces, impulses, strict=True)]
-        numbers += [force.vector[1] * impulse for force, impulse in zip(forces, impulses, strict=True)]
-        self.numbers[: len(numbers)].assign(np.array(numbers))
-
-    def push(self, grid: Grid, fluid: Fluid, layout: Layout, u: wp.array, v: wp.array) -> None:
-        """Add the forces' impulses to u and v, in place."""
-        if self._profiles is None:
-            self._profiles = tuple(
-                wp.zeros(self.count * n, dtype=Real, device=self.device)
-                for n in (grid.nx, grid.nx, grid.ny, grid.ny)
-            )
-        periodic_x, periodic_y = fluid.walls.periodic
-        axes = (
-            (self.center_x, grid.nx, 0.0, grid.hx, grid.width * periodic_x),
-            (self.center_x, grid.nx, 0.5, grid.hx, grid.width * periodic_x),
-            (self.center_y, grid.ny, 0.5, grid.hy, grid.height * periodic_y),
-            (self.center_y, grid.ny, 0.0, grid.hy, grid.height * periodic_y),
-        )
-        for (center, points, start, h, period), profile in zip(axes, self._profiles, strict=True):
-            inputs = [center, self.radius, points, start, h, period]
-            force_kernels.profile.launch(self.count * points, self.device, inputs, [profile])
-        inputs = [self.impulse_x, self.impulse_y, *self._profiles, grid.nx, grid.ny]
-        force_kernels.push.launch(layout, self.device, inputs, [u, v], layers=self.count)
