@@ -37,6 +37,18 @@ def test_the_viscosity_check_holds(device):
         example.check(made[::-1])
 
 
+def test_the_variable_viscosity_check_holds(device):
+    """Strain in the stiff mask at most 0.12 of the free one, frozen eyes at most 1/100 of what is around."""
+    example = load("variable_viscosity")
+    made = [list(a.frames()) for a in example.animations(cells=128, width=96, device=device.alias)]
+    print(example.check(made))
+    assert example.sheet([frames[-1] for frames in made]).pixels.shape == (144, 288, 3)
+    with pytest.raises(AssertionError):
+        example.check([made[1], made[0], made[2]])
+    with pytest.raises(AssertionError):
+        example.check([made[0], made[1], made[1]])
+
+
 def test_any_picture_moves(device):
     example = load("any_picture")
     assert example.check(list(example.frames(example.CAT, cells=48, device=device.alias))) > 0.005
@@ -51,7 +63,7 @@ def test_examples_refuse_unknown_options(tmp_path):
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["oscillator", "viscosity", "any_picture"])
+@pytest.mark.parametrize("name", ["oscillator", "viscosity", "variable_viscosity", "any_picture"])
 def test_an_example_writes_its_animation(tmp_path, name):
     command = [sys.executable, str(ROOT / "examples" / f"{name}.py"), "--frames", "3", "--cells", "32"]
     result = subprocess.run(
@@ -62,7 +74,7 @@ def test_an_example_writes_its_animation(tmp_path, name):
 
 
 def test_the_readmes_python_runs(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    code = "\n".join(re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S))
     os.symlink(ROOT / "examples", tmp_path / "examples")
     result = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr

@@ -114,14 +114,15 @@ class Paintings:
         envelope, per_length = course(what, given, duration, scheme)
         length = given.get("strength", DEFAULT_LENGTH * side) / side
         radius = given.get("radius", DEFAULT_RADIUS * side) / side
+        force = _named(
+            name, lambda: ImageForce(self.read(name), kind, length * per_length, envelope, weight, radius)
+        )
         if kind == "gradient" and weight is None:
             self.note(
                 f"{name}: the pressure balances a gradient wholly, so alone it moves nothing; "
                 "use kind=contour, or give it an --effect-mask"
             )
-        return _named(
-            name, lambda: ImageForce(self.read(name), kind, length * per_length, envelope, weight, radius)
-        )
+        return force
 
 
 def files_of(viscosity: str | None, weight: str | None, freeze: str | None, forces: list[str]) -> list[str]:

@@ -206,7 +206,7 @@ def intensity(picture: Picture) -> np.ndarray:
     stored = as_stored(picture)
     grey = sum(weight * stored[..., channel] for weight, channel in zip(weights, colours, strict=False))
     opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
-    return np.clip(grey, 0.0, 1.0) * opacity
+    return np.round(np.clip(grey, 0.0, 1.0) * opacity, 6)  # full is 1: conversions round below that
 
 
 def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
