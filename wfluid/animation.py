@@ -14,6 +14,7 @@ from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
 from wfluid.device import open_device
 from wfluid.fluid import Fluid
 from wfluid.grid import LEAST_CELLS, Grid
+from wfluid.linear import ITERATION_LIMIT
 from wfluid.look_up import LookUp, check_look_up
 from wfluid.picture import Picture
 from wfluid.solver import Solver, SolveReport
@@ -238,16 +239,29 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
         raise FloatingPointError(
             f"frame {index}: the velocity is no longer finite; use smaller forces or steps"
         )
-    if warned or fluid.scheme == "paper" or pressure.relative <= POOR_RESIDUAL:
+    if warned or fluid.scheme == "paper":
         return warned
-    if pressure.method == "multigrid":
-        done, remedy = "cycles", f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
-    else:
-        done, remedy = "sweeps", "set solver (--solver) to multigrid"
-    warnings.warn(
-        f"frame {index}: the projection left {pressure.relative:.1e} of the divergence after "
-        f"{pressure.iterations} {done}; {remedy} (said once)",
-        PoorSolveWarning,
-        stacklevel=2,
-    )
-    return True
+    text = _poor(solve, fluid)
+    if text:
+        warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
+    return bool(text)
+
+
+def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
+    """What a step's solves left too much of, with the remedy; None if nothing."""
+    pressure, diffusion = solve.pressure, solve.diffusion
+    if pressure.relative > POOR_RESIDUAL:
+        left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"
+        if pressure.method == "multigrid":
+            more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
+            return f"{left} cycles; {more}"
+        if pressure.method == "jacobi":
+            return f"{left} sweeps; set solver (--solver) to multigrid"
+        return f"{left} iterations; soften the edges of the freeze mask"
+    if diffusion.method == "conjugate gradients" and diffusion.iterations == ITERATION_LIMIT:
+        return (
+            f"the diffusion left {diffusion.relative:.1e} of its change after "
+            f"{diffusion.iterations} iterations; "
+            "lower the contrast of the viscosity, soften its edges, or use more substeps"
+        )
+    return None

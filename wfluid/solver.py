@@ -49,7 +49,7 @@ class SolveReport:
     pressure: Residual
     """Of the projection: the divergence left, as iterations and norms."""
     diffusion: Residual
-    """Of the diffusion of u, relative to the change it made."""
+    """Of the diffusion, relative to the change it made; of u alone where the components are apart."""
     divergence: float
     """Largest |div v| left [1/s]."""
 

@@ -87,14 +87,14 @@ def main():
         for step in range(6):
             solver.step(a, b, [FORCE], step * dt, dt)
             a, b = b, a
-        controls, top = solver._controls[1], solver._pressure.levels[0]
-        ten_sweeps = lambda: [top.smooth(top.b, top.x, top.plain, top.y) for _ in range(10)]  # noqa: B023, E731
+        controls, top = solver._controls_for([FORCE]), solver._projection.system.levels[0]
+        ten_sweeps = lambda: top.smooth(top.b, top.x, [top.plain] * 10, top.r, top.y)  # noqa: B023, E731
         stages = {
             "10 Jacobi sweeps": graph(device, ten_sweeps),
             "foot": graph(device, lambda: solver._trace(a, controls)),  # noqa: B023
             "velocity, cubic": graph(device, lambda: [solver._advect(x, a.arrays[x]) for x in (0, 1)]),  # noqa: B023
             "map, cubic": graph(device, lambda: solver._carry_map(a, b)),  # noqa: B023
-            "diffusion": graph(device, lambda: [solver._diffuse(x, a.arrays[x]) for x in (0, 1)]),  # noqa: B023
+            "diffusion": graph(device, lambda: [solver._diffusion.diffuse(x, a.arrays[x]) for x in (0, 1)]),  # noqa: B023
             "projection": graph(device, lambda: solver._project((a.u, a.v), b)),  # noqa: B023
             "whole step": lambda: (solver.step(a, b, [FORCE], 0.1, dt), wp.synchronize_device(device)),  # noqa: B023
         }
