@@ -32,6 +32,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import warp as wp
+from wfluid.kernels.strips import Strip, share, strips_meet
 
 _PRECISIONS = {"float32": wp.float32, "float64": wp.float64}
 _precision = os.environ.get("WFLUID_PRECISION", "float32")
@@ -129,7 +130,9 @@ class Program:
 
         A layered program runs so for n = 0 … layers - 1.
         """
-        row, end = rows or (0, layout.ny)
+        row, end = share(*(rows or (0, layout.ny)))
+        if row == end:
+            return
         spans = layout.nx if device.is_cuda else -(-layout.nx // self.span)
         where = [row, end - row, spans, layout.first, layout.pitch]
         wp.launch(
@@ -149,8 +152,10 @@ class Lines:
 
     def launch(self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence) -> None:
         """Run the function for t = 0 … lines - 1."""
-        kernel = self.kernels["cuda" if device.is_cuda else "cpu"]
-        wp.launch(kernel, dim=lines, inputs=[*inputs], outputs=[*outputs], device=device)
+        first, end = share(0, lines)
+        if first < end:
+            kernel = self.kernels["cuda" if device.is_cuda else "cpu"]
+            wp.launch(kernel, dim=end - first, inputs=[*inputs], outputs=[*outputs, first], device=device)
 
 
 _CELLS = """def {name}({signature}, row_: int, rows_: int, spans_: int, first_: int, pitch_: int):
@@ -165,8 +170,8 @@ _CELLS = """def {name}({signature}, row_: int, rows_: int, spans_: int, first_: 
         func({layer}i + c, j, k + c, {arguments})
 """
 
-_LINES = """def {name}({signature}):
-    t = wp.tid()
+_LINES = """def {name}({signature}, first_: int):
+    t = first_ + wp.tid()
 {hoisted}
     func(t, {arguments})
 """
@@ -221,6 +226,15 @@ def module_of(kind: str, name: str = "wfluid") -> wp.Module:
     module = wp.get_module(f"{name}.{kind}")
     module.options.update(enable_backward=False, fuse_fp=kind == "cuda", cpu_compiler_flags=CPU_FLAGS)
     return module
+
+
+_meeting = wp.kernel(strips_meet, module=module_of("cpu"))
+
+
+def strips(count: int, device: wp.Device) -> list[Strip]:
+    """As many strips of a CPU, to capture the same launches with each."""
+    counter = wp.zeros(2, dtype=wp.int32, device=device)
+    return [Strip(index, count, counter, _meeting) for index in range(count)]
 
 
 @wp.func_native("__builtin_assume(k >= 4); return k;")

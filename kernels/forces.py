@@ -47,6 +47,20 @@ def profile(
 
 
 @cells
+def copied(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    # outputs
+    out: Field,
+):
+    """Out = f: the component that forces are then added to."""
+    k = inside(k)
+    out[k] = f[k]
+
+
+@cells
 def push(
     n: int,
     i: int,

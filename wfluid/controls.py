@@ -12,6 +12,7 @@ from wfluid.grid import Grid
 from wfluid.image_force import ImageForce
 from wfluid.kernels import forces as kernels
 from wfluid.kernels.cells import Layout, Real
+from wfluid.kernels.strips import alone
 from wfluid.painted import Painted
 from wfluid.state import Vector, field, from_numpy, vector
 from wfluid.walls import Ghosts, Walls
@@ -84,8 +85,13 @@ class Controls:
             numbers += group.numbers([forces[n] for n in group.members], [impulses[n] for n in group.members])
         self._numbers.assign(np.array(numbers))
 
-    def push(self, velocity: Vector) -> None:
-        """Add the forces' impulses to the velocity, in place: launches only."""
+    def push(self, velocity: Vector, out: Vector) -> None:
+        """Out = the velocity and the forces' impulses, without ghosts: launches only."""
+        for f, to in zip(velocity, out, strict=True):
+            kernels.copied.launch(self.layout, self.device, [f], [to])
+        self._add_impulses(out)
+
+    def _add_impulses(self, velocity: Vector) -> None:
         for (_, fields), impulse in zip(self._images, self._image_impulses, strict=True):
             for f, component in zip(fields, velocity, strict=True):
                 kernels.push_field.launch(self.layout, self.device, [f, impulse], [component])
@@ -146,8 +152,7 @@ class _Group:
         to = velocity
         if self.weight is not None:
             to = self.gained
-            for f in to:
-                f.zero_()
+            alone(lambda: [f.zero_() for f in to])
         inputs = [self.impulse_x, self.impulse_y, *self.profiles, grid.nx, grid.ny]
         kernels.push.launch(layout, device, inputs, to, layers=count)
         if self.weight is not None:

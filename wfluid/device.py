@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import wraps
 from pathlib import Path
 
 import warp as wp
 
 from wfluid.files import quiet_stderr
-from wfluid.kernels.cells import module_of
+from wfluid.kernels.cells import module_of, strips
+from wfluid.kernels.strips import GIVEN_UP, STRIP, Strip
 
 LAUNCHES = threading.RLock()
 """Held by whatever calls Warp but for replays: a capture takes in what any thread allocates or launches."""
@@ -28,11 +31,61 @@ def exclusive(method: Callable) -> Callable:
     return held
 
 
-def capture(device: wp.Device, work: Callable[[], None]) -> wp.Graph:
-    """The launches of `work` as a graph, to be replayed with `wp.capture_launch`."""
+class Replay:
+    """The launches of `work`, captured once, replayed by several threads that share their rows.
+
+    The calling thread is one of them, `pool`, which must have no other work, has the others.
+    """
+
+    def __init__(
+        self, device: wp.Device, work: Callable[[], None], pool: ThreadPoolExecutor | None, threads: int
+    ):
+        self._pool = pool
+        self._strips = strips(threads, device) if pool else [None]
+        self._graphs = [_captured(device, work, strip) for strip in self._strips]
+
+    def launch(self) -> None:
+        """Run it."""
+        try:
+            others = [self._pool.submit(wp.capture_launch, graph) for graph in self._graphs[1:]]
+            wp.capture_launch(self._graphs[0])
+            for other in others:
+                other.result()
+        except BaseException:  # interrupted: whoever waits for this thread must not do so for ever
+            if self._pool:
+                self._give_up()
+            raise
+
+    def _give_up(self) -> None:
+        """Let strips that wait go on to their end, whatever they compute; then forget the meetings."""
+        counter = self._strips[0].counter.numpy()
+        counter[GIVEN_UP] = 1
+        idle = threading.Barrier(len(self._graphs))  # reached when every helper has done what it had
+        for _ in self._graphs[1:]:
+            self._pool.submit(idle.wait)
+        idle.wait()
+        counter[:] = 0
+
+
+def _captured(device: wp.Device, work: Callable[[], None], strip: Strip | None) -> wp.Graph:
     with LAUNCHES, wp.ScopedCapture(device=device) as captured:
-        work()
+        token = STRIP.set(strip)
+        try:
+            work()
+        finally:
+            STRIP.reset(token)
     return captured.graph
+
+
+def helpers(threads: int) -> ThreadPoolExecutor | None:
+    """A pool for the threads beside the calling one; None where that is alone."""
+    return ThreadPoolExecutor(threads - 1) if threads > 1 else None
+
+
+def free_cores() -> int:
+    """Cores that this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
 
 
 class DeviceError(ValueError):

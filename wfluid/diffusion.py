@@ -14,6 +14,7 @@ from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import relaxation, viscosity
 from wfluid.kernels.cells import Layout, Real
+from wfluid.kernels.strips import together
 from wfluid.linear import ITERATION_LIMIT, LinearSystem, Residual, Solve
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
@@ -73,8 +74,12 @@ class SeparateDiffusion:
         sweeps = system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
         return sweeps or system.plan_cycles(tolerance)
 
-    def diffuse(self, axis: int, f: wp.array) -> None:
-        """out[axis] = f (with ghosts) diffused, with ghosts."""
+    def diffuse(self, velocity: Vector) -> None:
+        """Out = the velocity (with ghosts) diffused, with ghosts."""
+        for axis, f in enumerate(velocity):
+            self._diffuse_component(axis, f)
+
+    def _diffuse_component(self, axis: int, f: wp.array) -> None:
         system, change, answer = self.systems[axis], (self._change[axis],), (self._answer[axis],)
         system.levels[0].residual((f,), (f,), change)
         system.solve(self.how, change, answer)
@@ -127,13 +132,15 @@ class CoupledDiffusion:
     def diffuse(self, velocity: Vector) -> None:
         """Out = the velocity (with ghosts) diffused, with ghosts."""
         top = self.system.levels[0]
-        for f, beta, start in zip(velocity, self.medium.levels[0].beta, self._start, strict=True):
-            viscosity.dragged.launch(self.layout, self.device, [f, beta], [start])
+        with together():
+            for f, beta, start in zip(velocity, self.medium.levels[0].beta, self._start, strict=True):
+                viscosity.dragged.launch(self.layout, self.device, [f, beta], [start])
         top.fill(self._start)
         top.residual(velocity, self._start, self._change)
         self.system.solve(self.how, self._change, self._answer, whole=velocity)
-        for f, change, out in zip(self._start, self._answer, self.out, strict=True):
-            relaxation.add_scaled.launch(self.layout, self.device, [f, change, self._one], [out])
+        with together():
+            for f, change, out in zip(self._start, self._answer, self.out, strict=True):
+                relaxation.add_scaled.launch(self.layout, self.device, [f, change, self._one], [out])
         top.fill(self.out)
 
     def measure(self) -> Residual:

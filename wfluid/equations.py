@@ -8,6 +8,7 @@ import warp as wp
 from wfluid.chebyshev import chebyshev_factors
 from wfluid.kernels import relaxation, viscosity
 from wfluid.kernels.cells import Real
+from wfluid.kernels.strips import together
 from wfluid.medium import MediumLevel
 from wfluid.multigrid import Level, Points
 from wfluid.state import Vector, vector
@@ -159,8 +160,9 @@ class Stress(Level):
 
     def weigh(self) -> None:
         """Find M^-1, the weights of the sweeps: launches only; after the medium or the step change."""
-        for axis, medium in enumerate(self._axes()):
-            viscosity.weight.launch(self.layout, self.device, medium, [self.weights[axis]])
+        with together():
+            for axis, medium in enumerate(self._axes()):
+                viscosity.weight.launch(self.layout, self.device, medium, [self.weights[axis]])
 
     def _axes(self) -> tuple[list, list]:
         """The medium, the coefficients and the strides of u, then of v: the same with the axes exchanged."""
@@ -172,18 +174,21 @@ class Stress(Level):
 
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
         """Out = b - A x."""
-        for own, medium in enumerate(self._axes()):
-            inputs = [b[own], x[own], x[1 - own], *medium]
-            viscosity.residual.launch(self.layout, self.device, inputs, [out[own]])
+        with together():
+            for own, medium in enumerate(self._axes()):
+                inputs = [b[own], x[own], x[1 - own], *medium]
+                viscosity.residual.launch(self.layout, self.device, inputs, [out[own]])
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
         """Out = rate M^-1 b."""
-        for own in (0, 1):
-            inputs = [b[own], self.weights[own], rate]
-            viscosity.first_sweep.launch(self.layout, self.device, inputs, [out[own]])
+        with together():
+            for own in (0, 1):
+                inputs = [b[own], self.weights[own], rate]
+                viscosity.first_sweep.launch(self.layout, self.device, inputs, [out[own]])
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
         """Out = x + rate M^-1 (b - A x)."""
-        for own, medium in enumerate(self._axes()):
-            inputs = [b[own], x[own], x[1 - own], *medium, self.weights[own], rate]
-            viscosity.sweep.launch(self.layout, self.device, inputs, [out[own]])
+        with together():
+            for own, medium in enumerate(self._axes()):
+                inputs = [b[own], x[own], x[1 - own], *medium, self.weights[own], rate]
+                viscosity.sweep.launch(self.layout, self.device, inputs, [out[own]])

@@ -18,6 +18,7 @@ import warp as wp
 from wfluid.chebyshev import chebyshev_count, chebyshev_factors
 from wfluid.kernels import dense, krylov, measure, relaxation
 from wfluid.kernels.cells import Layout, Real
+from wfluid.kernels.strips import alone, repeat_while, together
 from wfluid.multigrid import Level, Transfer
 from wfluid.state import Vector, vector
 
@@ -99,8 +100,7 @@ class LinearSystem:
         # -1 1^T takes the place of the constant, which a singular operator does not see
         shift = float(np.prod([1 / h for h in level.h])) / cells if self.singular else 0.0
         zero = level.b
-        for f in zero:
-            f.zero_()
+        alone(lambda: [f.zero_() for f in zero])
         for column in range(n):
             for component, f in enumerate(level.x):
                 dense.unit.launch(cells, self.device, [column - component * cells, *where], [f])
@@ -173,8 +173,9 @@ class LinearSystem:
                 left = self.left
             self.cycle(left, self.correction)
             start, factor = other if cycle else self.zero, factors[cycle : cycle + 1]
-            for f, e, out in zip(start, self.correction, at, strict=True):
-                relaxation.add_scaled.launch(top.layout, self.device, [f, e, factor], [out])
+            with together():
+                for f, e, out in zip(start, self.correction, at, strict=True):
+                    relaxation.add_scaled.launch(top.layout, self.device, [f, e, factor], [out])
             top.fill(at)
 
     def cycle(self, b: Vector, out: Vector, depth: int = 0) -> None:
@@ -237,24 +238,23 @@ class _ConjugateGradients:
     def _multiply(self, x: Vector, y: Vector, out: wp.array) -> None:
         """Row sums of x y."""
         layout = self.layout
-        for n, (f, g) in enumerate(zip(x, y, strict=True)):
-            inputs = [f, g, layout.nx, layout.pitch, n * layout.ny]
-            krylov.row_products.launch(layout.ny, self.device, inputs, [out])
+        with together():
+            for n, (f, g) in enumerate(zip(x, y, strict=True)):
+                inputs = [f, g, layout.nx, layout.pitch, n * layout.ny]
+                krylov.row_products.launch(layout.ny, self.device, inputs, [out])
 
     def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None) -> None:
         """X = A^-1 b to the tolerance; b with ghosts, x comes with ghosts."""
         top = self.system.levels[0]
-        for f, r, start in zip(b, self.r, x, strict=True):
-            start.zero_()
-            wp.copy(r, f)
+        alone(lambda: [start.zero_() for start in x])
+        alone(lambda: [wp.copy(r, f) for f, r in zip(b, self.r, strict=True)])
         self.system.cycle(self.r, self.z)
-        for z, p in zip(self.z, self.p, strict=True):
-            wp.copy(p, z)
+        alone(lambda: [wp.copy(p, z) for z, p in zip(self.z, self.p, strict=True)])
         self._multiply(self.r, self.z, self._products)
         self._multiply(*((whole, whole) if whole else (self.r, self.z)), self._wholes)
         inputs = [self._products, self._wholes, self._rows, Real(how.tolerance), how.iterations]
         krylov.begin.launch(1, self.device, inputs, [self._rz, self._limit, self._going, self._iterations])
-        wp.capture_while(self._going, self._iterate, x=x, most=how.iterations)
+        repeat_while(self._going, lambda: self._iterate(x, how.iterations))
         top.fill(x)
 
     def _iterate(self, x: Vector, most: int) -> None:
@@ -263,16 +263,18 @@ class _ConjugateGradients:
         top.fill(self.q)
         self._multiply(self.p, self.q, self._products)
         krylov.measure_length.launch(1, device, [self._products, self._rows, self._rz], [self._length])
-        for p, q, f, r in zip(self.p, self.q, x, self.r, strict=True):
-            krylov.advance.launch(layout, device, [p, q, self._length], [f, r])
+        with together():
+            for p, q, f, r in zip(self.p, self.q, x, self.r, strict=True):
+                krylov.advance.launch(layout, device, [p, q, self._length], [f, r])
         top.fill(self.r)
         self.system.cycle(self.r, self.z)
         self._multiply(self.r, self.z, self._products)
         inputs = [self._products, self._rows, self._limit, most]
         outputs = [self._rz, self._ratio, self._going, self._iterations]
         krylov.measure_ratio.launch(1, device, inputs, outputs)
-        for z, p in zip(self.z, self.p, strict=True):
-            krylov.turn.launch(layout, device, [z, self._ratio], [p])
+        with together():
+            for z, p in zip(self.z, self.p, strict=True):
+                krylov.turn.launch(layout, device, [z, self._ratio], [p])
         top.fill(self.p)
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-import os
-from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import warp as wp
 
-from wfluid.device import LAUNCHES, capture, exclusive
+from wfluid.device import LAUNCHES, Replay, exclusive, free_cores, helpers
 from wfluid.grid import Grid
 from wfluid.kernels import lookup
 from wfluid.kernels.cells import HALO, Layout, Real, whole_spans
@@ -24,6 +22,9 @@ FILTERS = {
     "lanczos": lookup.look_up_lanczos,
 }
 EDGES = {"clamp": 0, "mirror": 1, "wrap": 2, "transparent": 3}
+
+STRIPS = 8
+"""Most threads that share a look-up."""
 
 _QUAD = 4
 
@@ -103,10 +104,8 @@ class LookUp:
         self._out = [
             wp.zeros(self._layout.size, dtype=lookup.Pixel, device=device) for _ in self._source.quads
         ]
-        workers = 1 if device.is_cuda else min(os.cpu_count() or 1, 8)
-        self._pool = ThreadPoolExecutor(workers) if workers > 1 else None
-        cuts = np.linspace(0, self.height, workers + 1).astype(int)
-        self._strips = [self._capture(rows) for rows in itertools.pairwise(cuts)]
+        threads = 1 if device.is_cuda else min(free_cores(), STRIPS)
+        self._replay = Replay(device, self._look_up, helpers(threads), threads)
 
     def launch(self, d_x: wp.array, d_y: wp.array) -> None:
         """Compute the coordinates and pixels of `render`, left in device memory."""
@@ -114,10 +113,7 @@ class LookUp:
             for d, ghosts, out in zip((d_x, d_y), self._ghosts, self._stretched, strict=True):
                 lookup.stretch_y.launch(self._strip, self.device, [d, *self._rows, self._grid.pitch], [out])
                 ghosts.fill(out)
-        if self._pool:
-            list(self._pool.map(wp.capture_launch, self._strips))
-        else:
-            wp.capture_launch(self._strips[0])
+        self._replay.launch()
 
     def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
         """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
@@ -125,7 +121,7 @@ class LookUp:
         quads = [self._to_numpy(out) for out in self._out]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
         pixels = np.array(pixels[..., : self._source.channels], dtype=np.float32, order="C")  # a copy
-        return Picture(pixels, self._source.alpha, self.picture.dtype, self.picture.metadata)
+        return replace(self.picture, pixels=pixels, alpha=self._source.alpha)
 
     @property
     def untouched(self) -> Picture:
@@ -158,20 +154,17 @@ class LookUp:
         grid = out.numpy()[: rows * layout.pitch].reshape(rows, layout.pitch, _QUAD)
         return grid[HALO : HALO + self.height, HALO : HALO + self.width]
 
-    def _capture(self, rows: tuple[int, int]) -> wp.Graph:
-        return capture(self.device, lambda: self._look_up((int(rows[0]), int(rows[1]))))
-
-    def _look_up(self, rows: tuple[int, int]) -> None:
+    def _look_up(self) -> None:
         source = self._source
         sizes = ((source.width, self.width, self._grid.nx), (source.height, self.height, self._grid.ny))
         for axis, (pixels, outputs, cells) in enumerate(sizes):
             step = pixels / outputs
             place = [step / 2 - 0.5, step * (axis == 0), step * (axis == 1), pixels / cells]
             inputs = [self._stretched[axis], *self._columns, self._strip.pitch, *place]
-            lookup.stretch_x.launch(self._layout, self.device, inputs, [self._coordinates[axis]], rows=rows)
+            lookup.stretch_x.launch(self._layout, self.device, inputs, [self._coordinates[axis]])
         for quad, out in zip(source.quads, self._out, strict=True):
             inputs = [quad, *self._coordinates, source.width, source.height, *self._edges]
-            self._program.launch(self._layout, self.device, inputs, [out], rows=rows)
+            self._program.launch(self._layout, self.device, inputs, [out])
 
 
 def _cubic_tables(cells: int, pixels: int, start: int, device: wp.Device) -> list[wp.array]:

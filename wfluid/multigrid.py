@@ -18,6 +18,7 @@ import warp as wp
 
 from wfluid.kernels import transfer
 from wfluid.kernels.cells import HALO, Layout, Real, whole_spans
+from wfluid.kernels.strips import together
 from wfluid.state import Vector, field, vector
 from wfluid.walls import Ghosts, Rule, ghost_table
 
@@ -70,8 +71,9 @@ class Level(ABC):
 
     def fill(self, x: Vector) -> None:
         """Fill the ghosts of x, and zero its faces on walls."""
-        for f, ghosts in zip(x, self.ghosts, strict=True):
-            ghosts.fill(f)
+        with together():
+            for f, ghosts in zip(x, self.ghosts, strict=True):
+                ghosts.fill(f)
 
     def smooth_from_zero(self, b: Vector, rates: Sequence[wp.array], spare: Vector, out: Vector) -> None:
         """One sweep for each of `rates`, from zero; b and out with ghosts."""
@@ -100,14 +102,22 @@ class Transfer:
 
     def restrict(self, r: Vector, out: Vector) -> None:
         """Out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
-        for component, f, to in zip(self.components, r, out, strict=True):
-            component.restrict(f, to)
+        with together():
+            for component, f in zip(self.components, r, strict=True):
+                component.down.along_y(f)
+        with together():
+            for component, to in zip(self.components, out, strict=True):
+                component.down.along_x(to)
         self.coarse.fill(out)
 
     def prolong_add(self, x: Vector, e: Vector, out: Vector) -> None:
         """Out = x + the interpolated e; e with ghosts."""
-        for component, f, correction, to in zip(self.components, x, e, out, strict=True):
-            component.prolong_add(f, correction, to)
+        with together():
+            for component, correction in zip(self.components, e, strict=True):
+                component.along_x(correction)
+        with together():
+            for component, f, to in zip(self.components, x, out, strict=True):
+                component.add_along_y(f, to)
         self.fine.fill(out)
 
 
@@ -116,25 +126,44 @@ class _Interpolation:
 
     def __init__(self, fine: Layout, coarse: Layout, points: Points, device: wp.Device):
         self.fine, self.coarse, self.device = fine, coarse, device
-        self.strip = Layout(fine.nx, coarse.ny)
-        self.between = field(self.strip, device)
         x, y = (
             _interpolation(n, m, rule, on_faces)
             for n, m, rule, on_faces in zip(
                 (fine.nx, fine.ny), (coarse.nx, coarse.ny), points.rules, points.on_faces, strict=True
             )
         )
-        self.down_x, self.down_y = (collecting(_transposed(*axis), device) for axis in (x, y))
+        self.down = Collection(fine, coarse, _transposed(*x), _transposed(*y), device)
         self.up_x, self.up_y = (_padded(axis[0] + HALO, axis[1], device) for axis in (x, y))
 
-    def restrict(self, r: wp.array, out: wp.array) -> None:
-        collect(self.fine, self.coarse, r, self.between, out, self.down_x, self.down_y)
-
-    def prolong_add(self, x: wp.array, e: wp.array, out: wp.array) -> None:
+    def along_x(self, e: wp.array) -> None:
+        """Interpolate rows to the fine grid's columns."""
         inputs, rows = [e, *self.up_x, self.coarse.pitch], (-1, self.coarse.ny + 1)
-        transfer.prolong_x.launch(self.strip, self.device, inputs, [self.between], rows=rows)
-        inputs = [x, self.between, *self.up_y, self.strip.pitch]
+        transfer.prolong_x.launch(self.down.strip, self.device, inputs, [self.down.between], rows=rows)
+
+    def add_along_y(self, x: wp.array, out: wp.array) -> None:
+        """Out = x + what `along_x` made, interpolated to the fine grid's rows."""
+        inputs = [x, self.down.between, *self.up_y, self.down.strip.pitch]
         transfer.prolong_y_add.launch(self.fine, self.device, inputs, [out])
+
+
+class Collection:
+    """Sums of at most 4 x 4 points of a fine grid with weights, for each point of a coarse one."""
+
+    def __init__(self, fine: Layout, coarse: Layout, x: list[dict], y: list[dict], device: wp.Device):
+        self.fine, self.coarse, self.device = fine, coarse, device
+        self.strip = Layout(fine.nx, coarse.ny)
+        self.between = field(self.strip, device)
+        self._x, self._y = _tables(x, device), _tables(y, device)
+
+    def along_y(self, f: wp.array) -> None:
+        """Sum rows."""
+        inputs = [f, *self._y, self.fine.pitch]
+        transfer.restrict_y.launch(self.strip, self.device, inputs, [self.between])
+
+    def along_x(self, out: wp.array) -> None:
+        """Out = the sums over columns of what `along_y` made, without ghosts."""
+        inputs = [self.between, *self._x, self.strip.pitch]
+        transfer.restrict_x.launch(self.coarse, self.device, inputs, [out])
 
 
 class Averaging:
@@ -153,27 +182,18 @@ class Averaging:
         on_faces: tuple[bool, bool] = (False, False),
         periodic: tuple[bool, bool] = (False, False),
     ):
-        self.fine, self.coarse = fine, coarse
-        self.between = field(Layout(fine.nx, coarse.ny), device)
-        self.down_x, self.down_y = (
-            collecting(_hats(n, m, wraps) if faces else _means(n, m), device)
+        x, y = (
+            _hats(n, m, wraps) if faces else _means(n, m)
             for n, m, faces, wraps in zip(
                 (fine.nx, fine.ny), (coarse.nx, coarse.ny), on_faces, periodic, strict=True
             )
         )
+        self._collection = Collection(fine, coarse, x, y, device)
 
     def average(self, f: wp.array, out: wp.array) -> None:
         """Out = the means of f, without ghosts."""
-        collect(self.fine, self.coarse, f, self.between, out, self.down_x, self.down_y)
-
-
-def collect(
-    fine: Layout, coarse: Layout, f: wp.array, between: wp.array, out: wp.array, down_x, down_y
-) -> None:
-    """Weighted sums of at most 4 x 4 points of f, by the tables of both axes (`collecting`)."""
-    strip, device = Layout(fine.nx, coarse.ny), out.device
-    transfer.restrict_y.launch(strip, device, [f, *down_y, fine.pitch], [between])
-    transfer.restrict_x.launch(coarse, device, [between, *down_x, strip.pitch], [out])
+        self._collection.along_y(f)
+        self._collection.along_x(out)
 
 
 def hierarchy(nx: int, ny: int, size: tuple[float, float]) -> list[tuple[int, int]]:
@@ -246,7 +266,7 @@ def _hats(n: int, m: int, periodic: bool) -> list[dict[int, float]]:
     return [{int(i): float(row[i]) for i in np.flatnonzero(row)} for row in weights]
 
 
-def collecting(collected: list[dict[int, float]], device: wp.Device):
+def _tables(collected: list[dict[int, float]], device: wp.Device):
     """Four tables of points (counted with the halo) that a coarse point collects, and four of weights."""
     room = whole_spans(len(collected))
     points, weights = np.full((4, room), HALO), np.zeros((4, room))

@@ -13,9 +13,7 @@ O(dt^2) a step.
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,23 +21,30 @@ import numpy as np
 import warp as wp
 
 from wfluid.controls import STEP_LIMIT, Controls, Force
-from wfluid.device import capture, exclusive, load_kernels
+from wfluid.device import Replay, exclusive, free_cores, helpers, load_kernels
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, transport
 from wfluid.kernels.cells import Layout
+from wfluid.kernels.strips import together
 from wfluid.linear import Residual
 from wfluid.medium import Medium
 from wfluid.projection import Projection
 from wfluid.state import State, Vector, from_numpy, vector, where
 from wfluid.walls import Ghosts
 
-GRAPHS_KEPT = 16
-"""Pairs of states whose graphs are kept; the oldest goes first."""
+REPLAYS_KEPT = 16
+"""Pairs of states whose steps are kept captured; the oldest goes first."""
 
-SIDE_BY_SIDE = 300 * 300
-"""Cells from which on a second thread saves more than it costs to wake it: 1.0x at 256^2, 1.4x at 512^2."""
+STRIPS = 2
+"""Threads that share a step on a CPU: more wait for memory."""
+
+SHARED_CELLS = 300 * 300
+"""Cells from which on sharing a step gains more than the threads lose where other work runs beside it."""
+
+COUPLED_WORK = 4
+"""Times as much work that a coupled diffusion makes of a step."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +62,10 @@ class SolveReport:
 class Solver:
     """Steps fluids of one grid and one kind on one device.
 
-    Building one loads the kernels. For each pair of states stepped between, the stages are captured as
-    graphs and replayed from then on; the time, the step and the forces' numbers are read from device
-    memory. On a CPU, stages that do not need each other run side by side: u beside v, then the map
-    beside the projection. A solver is for one thread at a time; several may each have their own.
+    Building one loads the kernels. For each pair of states stepped between, the step is captured as
+    a graph and replayed from then on; the time, the step and the forces' numbers are read from device
+    memory. On a CPU with free cores two threads share the rows of every stage, with the same bits as one. A
+    solver is for one thread at a time; several may each have their own.
     """
 
     @exclusive
@@ -83,11 +88,12 @@ class Solver:
         self._projection = Projection(grid, fluid, self._medium if fluid.freeze else None, device)
         self._foot_x, self._foot_y = vector(self.layout, device, 2)
         self._pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
-        self._preparation: wp.Graph | None = None
+        self._preparation: Replay | None = None
         self._controls: dict[tuple, Controls] = {}
-        self._graphs: dict[tuple, tuple[list[list[wp.Graph]], State, State, Controls]] = {}
-        threads = not device.is_cuda and (os.cpu_count() or 1) > 1 and grid.nx * grid.ny >= SIDE_BY_SIDE
-        self._pool = ThreadPoolExecutor(2) if threads else None
+        self._replays: dict[tuple, tuple[Replay, State, State, Controls]] = {}
+        work = grid.nx * grid.ny * (COUPLED_WORK if self._medium else 1)
+        shared = not device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
+        self._pool = helpers(STRIPS if shared else 1)
 
     @exclusive
     def rest(self) -> State:
@@ -126,15 +132,10 @@ class Solver:
         if state_in is state_out:
             raise ValueError("a step cannot write the state it reads")
         self._check(state_in, state_out)
-        for stage in self._graphs_for(state_in, state_out, forces, t, dt, t + dt if until is None else until):
-            if self._pool and len(stage) > 1:
-                list(self._pool.map(wp.capture_launch, stage))
-            else:
-                for graph in stage:
-                    wp.capture_launch(graph)
+        self._replay_for(state_in, state_out, forces, t, dt, t + dt if until is None else until).launch()
 
     @exclusive
-    def _graphs_for(
+    def _replay_for(
         self,
         state_in: State,
         state_out: State,
@@ -142,19 +143,19 @@ class Solver:
         t: float,
         dt: float,
         until: float,
-    ) -> list[list[wp.Graph]]:
-        """The step's graphs, captured at first, with its numbers put where they read them."""
+    ) -> Replay:
+        """The step, captured at first, with its numbers put where it reads them."""
         controls = self._controls_for(forces)
         controls.set(forces, t, dt, until)
         plan = self._plan(until, dt)
         key = (id(state_in), id(state_out), id(controls), plan)
-        if key not in self._graphs:
-            stages = self._stages(state_in, state_out, controls)
-            graphs = [[capture(self.device, work) for work in stage] for stage in stages]
-            self._graphs[key] = (graphs, state_in, state_out, controls)
-            if len(self._graphs) > GRAPHS_KEPT:
-                del self._graphs[next(iter(self._graphs))]
-        return self._graphs[key][0]
+        if key not in self._replays:
+            work = partial(self._advance, state_in, state_out, controls)
+            replay = Replay(self.device, work, self._pool, STRIPS)
+            self._replays[key] = (replay, state_in, state_out, controls)
+            if len(self._replays) > REPLAYS_KEPT:
+                del self._replays[next(iter(self._replays))]
+        return self._replays[key][0]
 
     def _plan(self, t: float, dt: float) -> tuple:
         """Make diffusion and projection ready for a step of dt that ends at t; how they will solve."""
@@ -168,10 +169,10 @@ class Solver:
         return self._solves
 
     def _prepare(self) -> None:
-        """Bring what depends on the medium up to date, as one graph."""
+        """Bring what depends on the medium up to date."""
         if self._preparation is None:
-            self._preparation = capture(self.device, self._follow_medium)
-        wp.capture_launch(self._preparation)
+            self._preparation = Replay(self.device, self._follow_medium, self._pool, STRIPS)
+        self._preparation.launch()
 
     def _follow_medium(self, state: State | None = None) -> None:
         """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""
@@ -204,14 +205,7 @@ class Solver:
         self._plan(t + dt, dt)
         if self.fluid.viscosity_moves:
             self._follow_medium(state_in)
-        velocity = (state_in.u, state_in.v)
-        if self._medium:
-            self._diffusion.diffuse(velocity)
-        elif self._diffuses:
-            for axis, f in enumerate(velocity):
-                self._diffusion.diffuse(axis, f)
-        diffused = self._diffusion.out if self._diffuses else velocity
-        for f, out in zip(diffused, (state_out.u, state_out.v), strict=True):
+        for f, out in zip(self._diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
             wp.copy(out, f)
 
     @exclusive
@@ -232,49 +226,24 @@ class Solver:
     def _controls_for(self, forces: Sequence[Force]) -> Controls:
         key = Controls.key(forces)
         if key not in self._controls:
-            if len(self._controls) >= GRAPHS_KEPT:
+            if len(self._controls) >= REPLAYS_KEPT:
                 del self._controls[next(iter(self._controls))]
             self._controls[key] = Controls(forces, self.grid, self.fluid.walls, self.device)
         return self._controls[key]
 
-    def _stages(
-        self, state_in: State, state_out: State, controls: Controls
-    ) -> list[list[Callable[[], None]]]:
-        """The step as stages, one after the other, of works that may run side by side."""
-        v1 = self._pushed if controls.pushes else (state_in.u, state_in.v)
-        v2 = self._carried
-        v3 = self._diffusion.out if self._diffuses else v2
-
-        def begin() -> None:
-            if self.fluid.viscosity_moves:
-                self._follow_medium(state_in)
-            self._trace(state_in, controls)
-            self._push(state_in, controls)
-
-        def component(axis: int) -> None:
-            self._advect(axis, v1[axis])
-            if self._medium:
-                self._subtract_pressure(axis, state_in, controls)
-            elif self._diffuses:
-                self._diffusion.diffuse(axis, v2[axis])
-
-        def rest() -> None:
-            if self._medium:
-                self._diffusion.diffuse(self._pushed)
-            self._project(v3, state_out)
-            if self._medium:
-                self._projection.add_pressure(state_in.p, controls.inverse_dt, state_out.p)
-
-        return [
-            [begin],
-            [partial(component, 0), partial(component, 1)],
-            [rest, partial(self._carry_map, state_in, state_out)],
-        ]
-
-    @property
-    def _diffuses(self) -> bool:
-        """Whether the step planned last has a diffusion at all."""
-        return self._diffusion.how.iterations > 0
+    def _advance(self, state_in: State, state_out: State, controls: Controls) -> None:
+        """The step: launches only."""
+        if self.fluid.viscosity_moves:
+            self._follow_medium(state_in)
+        self._trace(state_in, controls)
+        self._carry_map(state_in, state_out)
+        velocity = self._push(state_in, controls)
+        velocity = self._advect(velocity)
+        velocity = self._subtract_pressure(velocity, state_in, controls)
+        velocity = self._diffuse(velocity)
+        self._project(velocity, state_out)
+        if self._medium:
+            self._projection.add_pressure(state_in.p, controls.inverse_dt, state_out.p)
 
     def _where(self) -> list[int]:
         return where(self.grid, self.fluid.walls, self.layout)
@@ -283,42 +252,61 @@ class Solver:
         trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
         inputs = [state.u, state.v, controls.dt_hx, controls.dt_hy, *self._where()]
         trace.launch(self.layout, self.device, inputs, [self._foot_x, self._foot_y])
-        self._d_x_ghosts.fill(self._foot_x)
-        self._d_y_ghosts.fill(self._foot_y)
+        with together():
+            self._d_x_ghosts.fill(self._foot_x)
+            self._d_y_ghosts.fill(self._foot_y)
 
-    def _push(self, state: State, controls: Controls) -> None:
-        if controls.pushes:
-            for f, pushed in zip((state.u, state.v), self._pushed, strict=True):
-                wp.copy(pushed, f)
-            controls.push(self._pushed)
-            for pushed, ghosts in zip(self._pushed, self._velocity_ghosts, strict=True):
-                ghosts.fill(pushed)
+    def _push(self, state: State, controls: Controls) -> Vector:
+        if not controls.pushes:
+            return state.u, state.v
+        controls.push((state.u, state.v), self._pushed)
+        self._fill(self._pushed)
+        return self._pushed
 
     def _carry_map(self, state_in: State, state_out: State) -> None:
         paper = self.fluid.scheme == "paper"
         carry = transport.carry_map_bilinear if paper else transport.carry_map_cubic
         inputs = [state_in.d_x, state_in.d_y, self._foot_x, self._foot_y, *self._where()]
         carry.launch(self.layout, self.device, inputs, [state_out.d_x, state_out.d_y])
-        self._d_x_ghosts.fill(state_out.d_x)
-        self._d_y_ghosts.fill(state_out.d_y)
+        with together():
+            self._d_x_ghosts.fill(state_out.d_x)
+            self._d_y_ghosts.fill(state_out.d_y)
 
-    def _advect(self, axis: int, f: wp.array) -> None:
+    def _advect(self, velocity: Vector) -> Vector:
         paper = self.fluid.scheme == "paper"
         advect = advection.advect_face_bilinear if paper else advection.advect_face_cubic
-        before = (1, self.layout.pitch)[axis]
-        inputs = [f, self._foot_x, self._foot_y, before, *self._where()]
-        advect.launch(self.layout, self.device, inputs, [self._carried[axis]])
-        self._velocity_ghosts[axis].fill(self._carried[axis])
+        with together():
+            for f, before, carried in zip(velocity, (1, self.layout.pitch), self._carried, strict=True):
+                inputs = [f, self._foot_x, self._foot_y, before, *self._where()]
+                advect.launch(self.layout, self.device, inputs, [carried])
+        self._fill(self._carried)
+        return self._carried
 
-    def _subtract_pressure(self, axis: int, state: State, controls: Controls) -> None:
-        """Pushed = the carried component without the gradient of the pressure known so far."""
-        before, dt_h = ((1, controls.dt_hx), (self.layout.pitch, controls.dt_hy))[axis]
-        inputs, out = [self._carried[axis], state.p, dt_h, before], self._pushed[axis]
-        projection.subtract_slope.launch(self.layout, self.device, inputs, [out])
-        self._velocity_ghosts[axis].fill(out)
+    def _subtract_pressure(self, velocity: Vector, state: State, controls: Controls) -> Vector:
+        """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
+        if not self._medium:
+            return velocity
+        axes = ((1, controls.dt_hx), (self.layout.pitch, controls.dt_hy))
+        with together():
+            for f, (before, dt_h), pushed in zip(velocity, axes, self._pushed, strict=True):
+                projection.subtract_slope.launch(
+                    self.layout, self.device, [f, state.p, dt_h, before], [pushed]
+                )
+        self._fill(self._pushed)
+        return self._pushed
+
+    def _diffuse(self, velocity: Vector) -> Vector:
+        if not self._diffusion.how.iterations:
+            return velocity
+        self._diffusion.diffuse(velocity)
+        return self._diffusion.out
 
     def _project(self, velocity: Vector, state_out: State) -> None:
         out = (state_out.u, state_out.v)
         self._projection.project(velocity, out)
-        for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
-            ghosts.fill(f)
+        self._fill(out)
+
+    def _fill(self, velocity: Vector) -> None:
+        with together():
+            for f, ghosts in zip(velocity, self._velocity_ghosts, strict=True):
+                ghosts.fill(f)

@@ -92,9 +92,9 @@ def main():
         stages = {
             "10 Jacobi sweeps": graph(device, ten_sweeps),
             "foot": graph(device, lambda: solver._trace(a, controls)),  # noqa: B023
-            "velocity, cubic": graph(device, lambda: [solver._advect(x, a.arrays[x]) for x in (0, 1)]),  # noqa: B023
+            "velocity, cubic": graph(device, lambda: [solver._advect((a.u, a.v))]),  # noqa: B023
             "map, cubic": graph(device, lambda: solver._carry_map(a, b)),  # noqa: B023
-            "diffusion": graph(device, lambda: [solver._diffusion.diffuse(x, a.arrays[x]) for x in (0, 1)]),  # noqa: B023
+            "diffusion": graph(device, lambda: [solver._diffusion.diffuse((a.u, a.v))]),  # noqa: B023
             "projection": graph(device, lambda: solver._project((a.u, a.v), b)),  # noqa: B023
             "whole step": lambda: (solver.step(a, b, [FORCE], 0.1, dt), wp.synchronize_device(device)),  # noqa: B023
         }

@@ -312,7 +312,7 @@ def test_graphs_of_passing_states_are_let_go(make_solver):
         after = solver.rest()
         solver.step(state, after, [], 0.0, 0.01)
         state = after
-    assert len(solver._graphs) <= 16
+    assert len(solver._replays) <= 16
 
 
 @pytest.mark.parametrize("walls", ["free-slip", "periodic,no-slip"])

@@ -1,0 +1,169 @@
+"""Strips: threads that share the rows of a step compute what one thread does, and never wait for ever."""
+
+import threading
+
+import numpy as np
+import pytest
+import warp as wp
+from wfluid.kernels.cells import strips
+from wfluid.kernels.strips import GIVEN_UP, STRIP, repeat_while, share, together
+
+import wfluid.device
+import wfluid.solver
+from wfluid import Fluid, Freeze, GaussianForce, Grid, Painted, Solver
+from wfluid.device import Replay, helpers
+
+FORCE = GaussianForce((0.4, 0.5), (2.0, 1.0), 0.08)
+WEIGHTED = GaussianForce((0.6, 0.4), (-1.0, 1.0), 0.1, weight=Painted(np.eye(4)))
+
+DISC = np.hypot(*(np.mgrid[0:96, 0:128] / 96 - 0.5)) < 0.2
+
+FLUIDS = {
+    "constant": {"viscosity": 0.001},
+    "paper": {"scheme": "paper", "sweeps": 5},
+    "smooth": {"viscosity": 0.02 + 0.01 * np.cos(np.arange(128) / 20) * np.ones((96, 1))},
+    "jump": {"viscosity": np.where(DISC, 1.0, 0.001)},
+    "moves": {"viscosity": np.where(DISC, 1.0, 0.001), "viscosity_moves": True},
+    "frozen": {"freeze": Freeze(DISC.astype(float))},
+    "no-slip": {"walls": "no-slip,periodic"},
+}
+
+
+@pytest.fixture
+def cpu(device):
+    if device.is_cuda:
+        pytest.skip("strips are for CPU threads")
+    return device
+
+
+def test_a_grid_of_few_rows_is_left_to_the_first_strip(cpu, monkeypatch):
+    """No launch is shared, every meeting is a loop's, and both threads come to the end."""
+    monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    mu = np.where(np.arange(160) % 40 < 20, 1.0, 0.001) * np.ones((30, 1))
+    solver = Solver(Grid(160, 30, 1.0, 30 / 160), Fluid(viscosity=mu), cpu)
+    a, b = solver.rest(), solver.rest()
+    for step in range(100):
+        solver.step(a, b, [FORCE], step / 24, 1 / 24)
+        a, b = b, a
+    assert solver.report().diffusion.method == "conjugate gradients"
+
+
+@pytest.mark.parametrize("name", FLUIDS)
+def test_two_threads_compute_the_bits_of_one(cpu, monkeypatch, name):
+    """Velocity, map and pressure of steps shared by two threads equal those of one, exactly."""
+    states = []
+    for threads in (1, 2):
+        monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0 if threads == 2 else 10**9)
+        monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+        solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(**FLUIDS[name]), cpu)
+        assert (solver._pool is not None) == (threads == 2)
+        a, b = solver.rest(), solver.rest()
+        for step in range(4):
+            solver.step(a, b, [FORCE, WEIGHTED], step / 24, 1 / 24)
+            a, b = b, a
+        states.append([f.numpy() for f in a.arrays])
+    for one, two in zip(*states, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert np.abs(states[0][0]).max() > 0.01
+
+
+def test_shares_cover_every_line_once(cpu):
+    """Many lines are cut into parts that follow on one another, few are left to the first strip."""
+    for lines in (1, 47, 48, 49, 1000):
+        for count in (2, 3, 8):
+            parts = [strip.share(5, 5 + lines) for strip in strips(count, cpu)]
+            ends = [5, *(end for _, end in parts)]
+            covered = [n for first, end in parts for n in range(first, end)]
+            assert covered == list(range(5, 5 + lines)), parts
+            assert ends == sorted(ends)
+    assert share(3, 9) == (3, 9)
+
+
+def meetings(cpu, launches):
+    """How often one strip meets the others during `launches`."""
+    counter = wp.zeros(2, dtype=wp.int32, device=cpu)
+    (strip,) = strips(1, cpu)
+    strip.counter = counter
+    token = STRIP.set(strip)
+    try:
+        launches(strip)
+    finally:
+        STRIP.reset(token)
+    return int(counter.numpy()[0])
+
+
+def test_strips_meet_only_where_one_may_read_what_another_wrote(cpu):
+    def shared(strip):
+        strip.share(0, 100)
+
+    def few(strip):
+        strip.share(0, 10)
+
+    def in_turn(*launches):
+        return lambda strip: [launch(strip) for launch in launches]
+
+    def at_once(*launches):
+        def run(strip):
+            with together():
+                in_turn(*launches)(strip)
+
+        return run
+
+    assert meetings(cpu, in_turn(shared)) == 0
+    assert meetings(cpu, in_turn(shared, shared, shared)) == 2
+    assert meetings(cpu, in_turn(few, few, few)) == 0
+    assert meetings(cpu, in_turn(few, shared, few, few, shared)) == 3
+    assert meetings(cpu, at_once(shared, shared, shared)) == 0
+    assert meetings(cpu, in_turn(shared, at_once(shared, few, shared), shared)) == 2
+    assert meetings(cpu, in_turn(few, at_once(few, shared), few)) == 2
+
+
+def test_a_loop_in_a_graph_runs_as_often_on_every_strip(cpu):
+    """Every strip reads the same condition, though the first changes it."""
+    going, passes = wp.array([1], dtype=wp.int32), wp.zeros(1, dtype=wp.int32)
+
+    def body():
+        if STRIP.get().alone():
+            wp.launch(count_down, dim=1, inputs=[passes, going], device=cpu)
+
+    replay = Replay(cpu, lambda: repeat_while(going, body), helpers(2), 2)
+    for _ in range(300):  # a strip that read the condition late would leave the other waiting
+        going.assign([1])
+        passes.zero_()
+        replay.launch()
+        assert passes.numpy()[0] == 5
+    assert replay._strips[0].counter.numpy()[0] == 300 * 2 * 12
+
+
+@wp.kernel(module="tests.strips")
+def count_down(passes: wp.array[int], going: wp.array[int]):
+    passes[0] = passes[0] + 1
+    going[0] = int(passes[0] < 5)
+
+
+def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
+    """The calling thread is stopped before its strip: the other ends, and the next step is right."""
+    monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(), cpu)
+    a, b, c = solver.rest(), solver.rest(), solver.rest()
+    solver.step(a, b, [FORCE], 0.0, 0.1)
+    expected = b.velocity[0]
+    launch, main_thread = wp.capture_launch, threading.current_thread()
+
+    def interrupted(graph):
+        if threading.current_thread() is main_thread:
+            raise KeyboardInterrupt
+        launch(graph)
+
+    monkeypatch.setattr(wp, "capture_launch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        solver.step(a, b, [FORCE], 0.0, 0.1)
+    monkeypatch.setattr(wp, "capture_launch", launch)
+    (replay, *_) = next(iter(solver._replays.values()))
+    assert replay._strips[0].counter.numpy().tolist() == [0, 0] and GIVEN_UP == 1
+    solver.step(a, b, [FORCE], 0.0, 0.1)
+    solver.step(a, c, [FORCE], 0.0, 0.1)
+    np.testing.assert_array_equal(b.velocity[0], expected)
+    np.testing.assert_array_equal(c.velocity[0], expected)
