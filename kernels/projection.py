@@ -38,15 +38,15 @@ def subtract_slope(
     j: int,
     k: int,
     f: Field,
-    p: Field,
-    dt_h: Uniform,
+    q: Field,
+    kept_h: Uniform,
     before: int,
     # outputs
     out: Field,
 ):
-    """f - dt dp/ds on the face between centres k - `before` and k, one component of v - dt grad p."""
+    """f - kept dq/ds on the face between centres k - `before` and k, one component of v - kept grad q."""
     k = inside(k)
-    out[k] = f[k] - dt_h * (p[k] - p[inside(k - before)])
+    out[k] = f[k] - kept_h * (q[k] - q[inside(k - before)])
 
 
 @cells

@@ -309,7 +309,7 @@ def _preview(path: str, picture, pushes, fluid, weight) -> int:
 
 def _refuse_without_image(options: argparse.Namespace) -> None:
     for flag in ("viscosity_floor", "invert_viscosity", "viscosity_moves"):
-        if getattr(options, flag):
+        if getattr(options, flag) is not None and getattr(options, flag) is not False:
             raise ValueError(f"--{flag.replace('_', '-')} needs a --viscosity-image")
 
 

@@ -45,12 +45,12 @@ class Controls:
                     (index, _uploaded(force.on_faces(grid, walls.periodic), self.layout, device))
                 )
         self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
-        numbers = 3 + len(self._images) + _PER_FORCE * sum(len(g.members) for g in self._groups.values())
+        numbers = 5 + len(self._images) + _PER_FORCE * sum(len(g.members) for g in self._groups.values())
         self._numbers = wp.zeros(numbers, dtype=Real, device=device)
-        self.dt_hx, self.dt_hy, self.inverse_dt, *self._image_impulses = (
-            self._numbers[n : n + 1] for n in range(3 + len(self._images))
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept, *self._image_impulses = (
+            self._numbers[n : n + 1] for n in range(5 + len(self._images))
         )
-        start = 3 + len(self._images)
+        start = 5 + len(self._images)
         for group in self._groups.values():
             start = group.allocate(self._numbers, start, grid, walls, self.layout, device)
 
@@ -64,8 +64,10 @@ class Controls:
         """Whether there is any force."""
         return bool(self._forces)
 
-    def set(self, forces: Sequence[Force], t: float, dt: float, until: float) -> None:
+    def set(self, forces: Sequence[Force], t: float, dt: float, until: float, kept: float = 0.0) -> None:
         """Put a step of dt, in which forces act from t to `until`, on the device.
+
+        `kept` is the part of the last step's pressure that is taken for a first guess.
 
         Raises:
             ValueError: a force that would add more than the limit, with the force and the limit.
@@ -79,7 +81,8 @@ class Controls:
                     f"{at} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
                     f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
                 )
-        numbers = [dt / self.grid.hx, dt / self.grid.hy, 1 / dt if dt > 0 else 0.0]
+        hx, hy = self.grid.hx, self.grid.hy
+        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
         numbers += [impulses[index] for index, _ in self._images]
         for group in self._groups.values():
             numbers += group.numbers([forces[n] for n in group.members], [impulses[n] for n in group.members])

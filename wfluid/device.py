@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import wraps
 from pathlib import Path
 
@@ -31,15 +31,17 @@ def exclusive(method: Callable) -> Callable:
     return held
 
 
+_PATIENCE = 10.0
+"""How long an interrupted replay waits for its helpers to end [s]."""
+
+
 class Replay:
     """The launches of `work`, captured once, replayed by several threads that share their rows.
 
     The calling thread is one of them, `pool`, which must have no other work, has the others.
     """
 
-    def __init__(
-        self, device: wp.Device, work: Callable[[], None], pool: ThreadPoolExecutor | None, threads: int
-    ):
+    def __init__(self, device: wp.Device, work: Callable[[], None], pool: Helpers | None, threads: int):
         self._pool = pool
         self._strips = strips(threads, device) if pool else [None]
         self._graphs = [_captured(device, work, strip) for strip in self._strips]
@@ -63,8 +65,11 @@ class Replay:
         idle = threading.Barrier(len(self._graphs))  # reached when every helper has done what it had
         for _ in self._graphs[1:]:
             self._pool.submit(idle.wait)
-        idle.wait()
-        counter[:] = 0
+        try:
+            idle.wait(_PATIENCE)
+        finally:  # whoever came late, or is interrupted again
+            idle.abort()
+            counter[:] = 0
 
 
 def _captured(device: wp.Device, work: Callable[[], None], strip: Strip | None) -> wp.Graph:
@@ -77,9 +82,23 @@ def _captured(device: wp.Device, work: Callable[[], None], strip: Strip | None) 
     return captured.graph
 
 
-def helpers(threads: int) -> ThreadPoolExecutor | None:
-    """A pool for the threads beside the calling one; None where that is alone."""
-    return ThreadPoolExecutor(threads - 1) if threads > 1 else None
+class Helpers:
+    """The threads beside the calling one. A forked process, which inherits none, gets its own."""
+
+    def __init__(self, count: int):
+        self._count = count
+        self._process, self._pool = os.getpid(), ThreadPoolExecutor(count)
+
+    def submit(self, work: Callable, *arguments) -> Future:
+        """Have one of them do `work`."""
+        if self._process != os.getpid():
+            self._process, self._pool = os.getpid(), ThreadPoolExecutor(self._count)
+        return self._pool.submit(work, *arguments)
+
+
+def helpers(threads: int) -> Helpers | None:
+    """The helpers for so many threads; None where the calling one is alone."""
+    return Helpers(threads - 1) if threads > 1 else None
 
 
 def free_cores() -> int:

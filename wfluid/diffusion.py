@@ -55,9 +55,8 @@ class SeparateDiffusion:
         """Make ready for steps of dt; what the solve will be, "none" where nothing diffuses."""
         if dt == self._dt:
             return self.how
-        self._dt = dt
         if self.fluid.viscosity * dt == 0:
-            self.how = Solve("none", 0)
+            self.how, self._dt = Solve("none", 0), dt
             return self.how
         for system in self.systems:
             for level in system.levels:
@@ -65,6 +64,7 @@ class SeparateDiffusion:
             system.invert_coarsest()
             self.how = self._choose(system)
             system.prepare(self.how)
+        self._dt = dt
         return self.how
 
     def _choose(self, system: LinearSystem) -> Solve:

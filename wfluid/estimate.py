@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from wfluid.animation import Animation
 from wfluid.files import free_memory, readable_size
 
-FIELDS = 75
-"""Fields of the finest grid that a solver, two states and their hierarchies hold."""
+FIELDS, COUPLED_FIELDS = 77, 114
+"""Fields of the finest grid that a solver, two states and their hierarchies hold, by kind of diffusion."""
 
 FIELDS_PER_PIXEL = 3
 """Fields of the frames' size: two coordinates and what is being copied out."""
 
-SECONDS_PER_CELL_STEP = 100e-9
+SECONDS_PER_CELL_STEP, COUPLED_SECONDS = 100e-9, 400e-9
 SECONDS_PER_PIXEL = 40e-9
 
 QUEUED_FRAMES = 6
@@ -45,15 +45,16 @@ def estimate(animation: Animation, frames_kept: bool = False) -> Estimate:
     """
     grid, picture = animation.grid, animation.picture
     width, height = animation.width or picture.width, animation.height or picture.height
+    apart = animation.fluid.separable
     channels = -(-picture.pixels.shape[2] // 4) * 4
     memory = _REAL * (
-        FIELDS * grid.nx * grid.ny
+        (FIELDS if apart else COUPLED_FIELDS) * grid.nx * grid.ny
         + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
         + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
     )
     memory += PROGRAM + frames_kept * 3 * animation.timeline.frames * width * height
     steps = (animation.timeline.frames - 1) * animation.timeline.steps_per_frame
-    seconds = steps * grid.nx * grid.ny * SECONDS_PER_CELL_STEP
+    seconds = steps * grid.nx * grid.ny * (SECONDS_PER_CELL_STEP if apart else COUPLED_SECONDS)
     seconds += animation.timeline.frames * width * height * SECONDS_PER_PIXEL
     return Estimate(memory, seconds)
 

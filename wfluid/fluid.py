@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wfluid.painted import Freeze, Painted, Quantity, as_quantity, check_painted
+from wfluid.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
 from wfluid.walls import Wall, Walls
 
 SCHEMES = ("standard", "paper")
@@ -48,8 +48,10 @@ class Fluid:
     def __post_init__(self) -> None:
         object.__setattr__(self, "walls", Walls.parse(self.walls))
         object.__setattr__(self, "viscosity", as_quantity("viscosity", self.viscosity))
-        if isinstance(self.viscosity, Painted):
-            check_painted(self.viscosity.values)
+        keys = self.viscosity.keys.values() if isinstance(self.viscosity, Keyed) else [self.viscosity]
+        for painted in keys:
+            if isinstance(painted, Painted):
+                check_painted(painted.values)
         if self.freeze is not None and not isinstance(self.freeze, Freeze):
             raise TypeError(f"freeze: expected Freeze(mask), got {type(self.freeze).__name__}")
         _one_of("scheme", self.scheme, SCHEMES)

@@ -18,6 +18,10 @@ DEFAULT_RADIUS = 0.01
 """Sigma of the blur before slopes are taken [longer side]: about three pixels of a grid of 256."""
 
 
+_FLAT = 1e-5
+"""Range of intensities below which slopes are rounding."""
+
+
 @dataclass(frozen=True, eq=False)
 class ImageForce:
     """A force field from a picture, times an envelope (Bonilla & Velho, section III).
@@ -76,8 +80,11 @@ class ImageForce:
             force = [_mean_with_before(centres[..., n], 1 - n, periodic[n]) for n in (0, 1)]
         else:
             values = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
-            force = _slopes(_blurred(values, grid, self.radius, periodic), grid, self.kind, periodic)
-            steepest = np.sqrt(max(float(np.max(f**2)) for f in force)) or 1.0
+            values = _blurred(values, grid, self.radius, periodic)
+            if np.ptp(values) < _FLAT:
+                raise ValueError("ImageForce: blurred to the grid's cells the picture has no slopes left")
+            force = _slopes(values, grid, self.kind, periodic)
+            steepest = float(np.hypot(*force).max())
             force = [f / steepest for f in force]
         if self.weight is not None:
             weight = self.weight.on(grid)
@@ -98,12 +105,16 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
         ValueError: fewer than two channels, or values that are not finite.
     """
     if isinstance(picture, Picture):
-        values = as_stored(picture)
-        if values.shape[2] < 2:
+        values, alpha = as_stored(picture), picture.alpha
+        channels = [channel for channel in range(values.shape[2]) if channel != alpha][:2]
+        if len(channels) < 2:
             raise ValueError("a picture of vectors needs two channels")
+        opacity = 1.0 if alpha is None else values[..., [alpha]]
+        values = values[..., channels]
         codes = {"uint8": 255, "uint16": 65535}.get(picture.dtype)
         if codes:
             values = (values * codes - (codes + 1) / 2) / ((codes - 1) / 2)
+        values = values * opacity
     else:
         values = np.asarray(picture, dtype=np.float64)
         if values.ndim != 3 or values.shape[2] < 2:

@@ -95,14 +95,18 @@ class Medium:
         now = (t if self.changes else 0.0, dt)
         if now == self._now:
             return False
-        self._now = now
         mu = value_on(self.fluid.viscosity, self.grid, t)
         check_painted(mu)
         self.mu = np.broadcast_to(mu, self.mu.shape)
         from_numpy(self.mu, self._painted.mu, self._painted.layout)
         self._painted.fill()
         self._dt.assign([dt])
+        self._now = now
         return True
+
+    def forget(self) -> None:
+        """Have the next `follow` begin anew."""
+        self._now = None
 
     @property
     def changes(self) -> bool:

@@ -186,7 +186,7 @@ def _on_grid(painted: Painted, grid: Grid) -> np.ndarray:
     if painted.values.shape == (grid.ny, grid.nx):
         return painted.values.astype(np.float64)
     values = resample(painted.values.astype(np.float32), grid.nx, grid.ny)
-    return np.maximum(values.astype(np.float64), 0.0)
+    return np.clip(values.astype(np.float64), painted.values.min(), painted.values.max())
 
 
 def _finite_from_zero(name: str, values: np.ndarray) -> None:

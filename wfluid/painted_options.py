@@ -47,7 +47,7 @@ class Paintings:
             PictureError: it cannot be read, or has values that are not finite.
         """
         if name == SELF:
-            return self.picture.with_pixels(np.maximum(self.picture.pixels, 0.0))
+            return self.picture
         painting = read_picture(name, exact=True)
         aspect = painting.width / painting.height * self.picture.height / self.picture.width
         if abs(aspect - 1) > _SAME_ASPECT:
@@ -56,6 +56,11 @@ class Paintings:
                 f"{self.picture.width} x {self.picture.height}"
             )
         return painting
+
+    def _paint(self, name: str) -> Picture:
+        """The painting; of the picture itself what is below zero, out of a camera's gamut, is no paint."""
+        painting = self.read(name)
+        return painting.with_pixels(np.maximum(painting.pixels, 0.0)) if name == SELF else painting
 
     def viscosity(self, name: str | None, scale: float | None, floor: float, invert: bool) -> Quantity:
         """The viscosity of --viscosity-image, --viscosity, --viscosity-floor and --invert-viscosity.
@@ -66,7 +71,7 @@ class Paintings:
         if name is None:
             return DEFAULT_VISCOSITY if scale is None else scale
         scale = DEFAULT_PAINTED_VISCOSITY if scale is None else scale
-        painted = _named(name, lambda: Painted(self.read(name), scale, invert, floor))
+        painted = _named(name, lambda: Painted(self._paint(name), scale, invert, floor))
         if painted.values.max() == 0:
             shade = "white" if invert else "black"
             self.note(f"{name}: {shade} all over, so the viscosity is 0 everywhere: an inviscid fluid")
@@ -80,7 +85,7 @@ class Paintings:
         """
         if name is None:
             return None
-        painted = _named(name, lambda: Painted(self.read(name)))
+        painted = _named(name, lambda: Painted(self._paint(name)))
         if painted.values.max() == 0:
             raise ValueError(f"{name}: black all over, so no force would act; paint white what should move")
         return painted
@@ -94,7 +99,7 @@ class Paintings:
         if text is None:
             return None
         name, strength = _split_number(text)
-        frozen = _named(name, lambda: Freeze(self.read(name), strength))
+        frozen = _named(name, lambda: Freeze(self._paint(name), strength))
         if frozen.paint.values.max() == 0:
             self.note(f"{name}: black all over, so nothing is frozen")
         return frozen
@@ -115,7 +120,15 @@ class Paintings:
         length = given.get("strength", DEFAULT_LENGTH * side) / side
         radius = given.get("radius", DEFAULT_RADIUS * side) / side
         force = _named(
-            name, lambda: ImageForce(self.read(name), kind, length * per_length, envelope, weight, radius)
+            name,
+            lambda: ImageForce(
+                (self.read if kind == "vectors" else self._paint)(name),
+                kind,
+                length * per_length,
+                envelope,
+                weight,
+                radius,
+            ),
         )
         if kind == "gradient" and weight is None:
             self.note(

@@ -187,6 +187,10 @@ def as_stored(picture: Picture) -> np.ndarray:
     return stored
 
 
+_RINGING = 1e-3
+"""How far below zero a filter may have left a value that was painted 0."""
+
+
 def intensity(picture: Picture) -> np.ndarray:
     """Intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
 
@@ -197,7 +201,7 @@ def intensity(picture: Picture) -> np.ndarray:
         PictureError: a value that is negative or not finite.
     """
     pixels, alpha = picture.pixels, picture.alpha
-    wrong = ~np.isfinite(pixels) | (pixels < 0)
+    wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
     if wrong.any():
         raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
     colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]

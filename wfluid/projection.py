@@ -67,9 +67,9 @@ class Projection:
         inputs = [*velocity, *self._q, *beta, *self._inverse_h, pitch]
         subtract.launch(self.layout, self.device, inputs, out)
 
-    def add_pressure(self, p: wp.array, inverse_dt: wp.array, out: wp.array) -> None:
-        """Out = the pressure p [longer side^2/s^2] and what the last projection adds to it."""
-        inputs = [p, *self._q, inverse_dt]
+    def add_pressure(self, q: wp.array, kept: wp.array, out: wp.array) -> None:
+        """Out = the impulse of the pressure: the part `kept` of q, taken off before, and the projected."""
+        inputs = [*self._q, q, kept]
         relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
         self.system.levels[0].fill((out,))
 

@@ -88,6 +88,7 @@ class Solver:
         self._projection = Projection(grid, fluid, self._medium if fluid.freeze else None, device)
         self._foot_x, self._foot_y = vector(self.layout, device, 2)
         self._pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
+        self._last_dt = 0.0
         self._preparation: Replay | None = None
         self._controls: dict[tuple, Controls] = {}
         self._replays: dict[tuple, tuple[Replay, State, State, Controls]] = {}
@@ -107,6 +108,7 @@ class Solver:
         for values, f, ghosts in zip((u, v), (state.u, state.v), self._velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
             ghosts.fill(f)
+        state.q.zero_()
 
     def step(
         self,
@@ -146,7 +148,7 @@ class Solver:
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
         controls = self._controls_for(forces)
-        controls.set(forces, t, dt, until)
+        controls.set(forces, t, dt, until, self._kept(dt))
         plan = self._plan(until, dt)
         key = (id(state_in), id(state_out), id(controls), plan)
         if key not in self._replays:
@@ -155,7 +157,18 @@ class Solver:
             self._replays[key] = (replay, state_in, state_out, controls)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
+        self._replays[key] = self._replays.pop(key)  # the newest last
         return self._replays[key][0]
+
+    def _kept(self, dt: float) -> float:
+        """The part of the last step's pressure that a step of dt takes off before its diffusion.
+
+        None where viscosity changes or moves: the strain that belonged to it would be elsewhere.
+        """
+        medium, last, self._last_dt = self._medium, self._last_dt, dt
+        if not medium or medium.changes or self.fluid.viscosity_moves or last == 0:
+            return 0.0
+        return min(1.0, dt / last)
 
     def _plan(self, t: float, dt: float) -> tuple:
         """Make diffusion and projection ready for a step of dt that ends at t; how they will solve."""
@@ -163,9 +176,13 @@ class Solver:
         if not medium:
             return self._diffusion.plan(dt), self._projection.how
         if medium.follow(t, dt):
-            self._solves = self._diffusion.plan(dt), self._projection.plan(dt)
-            if not self.fluid.viscosity_moves:
-                self._prepare()
+            try:
+                self._solves = self._diffusion.plan(dt), self._projection.plan(dt)
+                if not self.fluid.viscosity_moves:
+                    self._prepare()
+            except BaseException:
+                medium.forget()  # half done
+                raise
         return self._solves
 
     def _prepare(self) -> None:
@@ -243,7 +260,7 @@ class Solver:
         velocity = self._diffuse(velocity)
         self._project(velocity, state_out)
         if self._medium:
-            self._projection.add_pressure(state_in.p, controls.inverse_dt, state_out.p)
+            self._projection.add_pressure(state_in.q, controls.kept, state_out.q)
 
     def _where(self) -> list[int]:
         return where(self.grid, self.fluid.walls, self.layout)
@@ -286,11 +303,11 @@ class Solver:
         """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
         if not self._medium:
             return velocity
-        axes = ((1, controls.dt_hx), (self.layout.pitch, controls.dt_hy))
+        axes = ((1, controls.kept_hx), (self.layout.pitch, controls.kept_hy))
         with together():
-            for f, (before, dt_h), pushed in zip(velocity, axes, self._pushed, strict=True):
+            for f, (before, kept_h), pushed in zip(velocity, axes, self._pushed, strict=True):
                 projection.subtract_slope.launch(
-                    self.layout, self.device, [f, state.p, dt_h, before], [pushed]
+                    self.layout, self.device, [f, state.q, kept_h, before], [pushed]
                 )
         self._fill(self._pushed)
         return self._pushed

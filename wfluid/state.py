@@ -61,8 +61,9 @@ class State:
     """Displacement (source - x) along x at centres [cells of hx]."""
     d_y: wp.array
     """Displacement (source - y) along y at centres [cells of hy]."""
-    p: wp.array
-    """Pressure at centres [longer side^2/s^2], the next step's first guess; 0 where diffusion needs none."""
+    q: wp.array
+    """Impulse of the pressure in the last step, at centres [longer side^2/s], the next step's first guess;
+    0 where diffusion needs none."""
 
     @classmethod
     def at_rest(cls, grid: Grid, device: wp.Device) -> State:
@@ -72,8 +73,8 @@ class State:
 
     @property
     def arrays(self) -> tuple[wp.array, ...]:
-        """u, v, d_x, d_y, p."""
-        return self.u, self.v, self.d_x, self.d_y, self.p
+        """u, v, d_x, d_y, q."""
+        return self.u, self.v, self.d_x, self.d_y, self.q
 
     @property
     def layout(self) -> Layout:

@@ -72,6 +72,23 @@ def test_vectors_are_read_with_zero_at_half_range():
     assert force.reach == pytest.approx(4 * np.hypot(0.5, 0.25))
 
 
+def test_transparent_vectors_are_none_and_alpha_is_no_channel():
+    """A hole in a picture of vectors pushes nothing; grey with alpha has one channel only."""
+    clear = Picture(np.zeros((4, 4, 4), np.float32), 3, "uint8", srgb=False)
+    assert np.abs(vectors_of(clear)).max() == 0
+    with pytest.raises(ValueError, match="needs two channels"):
+        vectors_of(Picture(np.ones((4, 4, 2), np.float32), 1, "uint8", srgb=False))
+
+
+def test_the_strength_is_the_length_where_it_is_steepest():
+    """Along a diagonal too; and what is flat but for rounding is refused."""
+    x, y = (np.arange(24) + 0.5) / 24, ((np.arange(18) + 0.5) / 24)[:, None]
+    force = ImageForce((x + y) / 2, strength=3.0, radius=0).on_faces(GRID, OPEN)
+    np.testing.assert_allclose(np.hypot(*force)[1:, 1:], 3.0, rtol=1e-4)
+    with pytest.raises(ValueError, match="no slopes left"):
+        ImageForce(0.3 + 1e-9 * np.arange(24) * np.ones((18, 1))).on_faces(GRID, OPEN)
+
+
 def velocity_after(make_solver, forces, steps=4, dt=0.05, **fluid):
     solver = make_solver(GRID.nx, GRID.ny, grid=GRID, viscosity=0.0, pressure_cycles=8, **fluid)
     a, b = solver.rest(), solver.rest()

@@ -78,17 +78,24 @@ def test_a_viscosity_image_stiffens_its_bright_side(folder, capsys):
     assert moved[()] > 1.5 > 1 / 1.5 > moved["--invert-viscosity",], moved
 
 
-def test_a_viscosity_that_moves_says_so(folder, capsys):
-    assert run(capsys, "--viscosity-image", "self", "--viscosity-moves") == (0, "")
+def test_a_viscosity_that_moves_is_another_motion(folder, capsys):
+    """Carried with the picture, a stiff side ends elsewhere than one that stays."""
+    flags = ("--viscosity-image", "right.png", "--viscosity", "1", "--viscosity-floor", "0.001")
+    ends = []
+    for moves in ((), ("--viscosity-moves",)):
+        assert run(capsys, *flags, *moves) == (0, "")
+        ends.append(sharp("o.1005.exr"))
+    assert np.abs(ends[1] - ends[0]).max() > 0.01
     assert json.loads((folder / "r.json").read_text())["settings"]["viscosity_moves"] is True
 
 
 def test_an_effect_mask_keeps_forces_to_its_white(folder, capsys):
-    """Nothing is pushed on the black side; what moves there is what the white side drags along."""
-    assert run(capsys, "--effect-mask", "right.png", "--force-image", "self:kind=contour,strength=3") == (
-        0,
-        "",
-    )
+    """Painted forces everywhere, then only on the white side: the far black side moves much less."""
+    moved = []
+    for mask in ((), ("--effect-mask", "right.png")):
+        assert run(capsys, "--force-image", "small.png:kind=contour,strength=4", *mask) == (0, "")
+        moved.append(np.abs(sharp("o.1005.exr") - sharp("o.1001.exr"))[:, 2:18].mean())
+    assert moved[1] < 0.5 * moved[0], moved
 
 
 @pytest.mark.parametrize(
@@ -134,6 +141,7 @@ def test_the_preview_tints_what_is_stiff_and_frozen(folder, capsys):
         (("--invert-viscosity",), "--invert-viscosity needs a --viscosity-image"),
         (("--viscosity-moves",), "--viscosity-moves needs a --viscosity-image"),
         (("--viscosity-floor", "0.1"), "--viscosity-floor needs a --viscosity-image"),
+        (("--viscosity-floor", "0"), "--viscosity-floor needs a --viscosity-image"),
         (("--freeze", "white.png"), "white.png: the freeze mask is painted all over"),
         (("--freeze", "black.png:-5"), "black.png: freeze strength -5.0: expected 0"),
         (("--freeze", "black.png:nan"), "freeze strength nan"),

@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from oracles import divergence, noise_velocity, strain_rate, stress_matrix
 
-from wfluid import Fluid, Freeze, GaussianForce, Keyed
+from wfluid import Fluid, Freeze, GaussianForce, Instantaneous, Keyed, Painted, Solver
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.grid import Grid
 from wfluid.linear import Solve
@@ -482,8 +482,12 @@ def test_a_viscosity_of_the_time_is_followed(make_solver):
             np.testing.assert_allclose(got, expected, rtol=1e-6)
 
 
-def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_solver):
-    """What is replayed for a viscosity of the time is what was set up for a still one."""
+def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_solver, monkeypatch):
+    """What is replayed for a viscosity of the time is what was set up for a still one.
+
+    But for the pressure kept from step to step, which only a still one may keep.
+    """
+    monkeypatch.setattr(Solver, "_kept", lambda self, dt: 0.0)
     mu = np.random.default_rng(1).random((24, 32)) * 0.05
     force = GaussianForce((0.5, 0.4), (1.0, 0.5), 0.1)
     ends = []
@@ -495,3 +499,81 @@ def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_s
             a, b = b, a
         ends.append(a.velocity[0])
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-5 * np.abs(ends[0]).max())
+
+
+def energy(state):
+    return sum(float(np.mean(f.astype(float) ** 2)) for f in state.velocity)
+
+
+@pytest.mark.parametrize("fluid", ["stiff", "frozen", "moves", "no-slip"])
+def test_a_free_flow_loses_energy_over_many_steps(make_solver, fluid):
+    """With whatever pressure is kept from step to step: no force, so no gain, for any medium and step."""
+    patches = np.kron(np.random.default_rng(2).random((8, 8)).round(), np.ones((4, 4)))
+    settings = {
+        "stiff": {"viscosity": Painted(patches, 10.0, floor=1e-4)},
+        "frozen": {"viscosity": 1e-3, "freeze": Freeze(patches)},
+        "moves": {"viscosity": Painted(patches, 10.0, floor=1e-4), "viscosity_moves": True},
+        "no-slip": {"viscosity": 1e-3, "walls": "no-slip"},
+    }[fluid]
+    for dt in (1 / 24, 0.2):
+        solver = make_solver(32, 32, stretch=1.0, **settings)
+        a, b = solver.rest(), solver.rest()
+        solver.set_velocity(a, *noise_velocity(solver))
+        solver.project(a, b, dt)
+        a, b = b, a
+        energies = [energy(a)]
+        for step in range(60):
+            solver.step(a, b, [], step * dt, dt)
+            a, b = b, a
+            energies.append(energy(a))
+        ratios = np.array(energies[1:]) / np.array(energies[:-1])
+        assert ratios.max() < 1.02 and energies[-1] < 0.1 * energies[0], (dt, ratios.max())
+
+
+@pytest.mark.parametrize("first", [1e-39, 1e-12, 1e-4, 1 / 480, 1 / 96, 1.0])
+def test_a_step_of_another_length_adds_nothing(make_solver, first):
+    """The pressure of a blow, or of a short step, is not that of the next one of 1/24 s."""
+    half = np.kron(np.array([[0.0, 1.0]]), np.ones((32, 16)))
+    blow = GaussianForce((0.5, 0.5), (5.0, 0.3), 0.05, Instantaneous(0.0))
+    for fluid in (
+        {"viscosity": Painted(half, 1.0, floor=1e-3)},
+        {"freeze": Freeze(half)},
+        {"walls": "no-slip"},
+    ):
+        solver = make_solver(32, 32, stretch=1.0, **fluid)
+        a, b = solver.rest(), solver.rest()
+        solver.step(a, b, [blow], 0.0, first)
+        energies = [energy(b)]
+        a, b = b, a
+        for step in range(5):
+            solver.step(a, b, [], 1 + step / 24, 1 / 24)
+            a, b = b, a
+            energies.append(energy(a))
+        assert max(energies[1:]) < energies[0] and energies[-1] < 0.75 * energies[0], (fluid, energies)
+
+
+def test_a_fluid_set_to_rest_stays_at_rest(make_solver):
+    """No pressure is left over from before."""
+    solver = make_solver(24, 24, walls="no-slip")
+    a, b = solver.rest(), solver.rest()
+    solver.step(a, b, [GaussianForce((0.5, 0.5), (5.0, 0.3), 0.1)], 0.0, 0.1)
+    solver.set_velocity(b, np.zeros((24, 25)), np.zeros((25, 24)))
+    solver.step(b, a, [], 0.1, 0.1)
+    assert energy(a) == 0
+
+
+def test_a_viscosity_at_the_limit_is_taken_on_any_grid(make_solver):
+    """Resampling rounds; what was within the range stays within."""
+    solver = make_solver(24, 24, viscosity=np.full((100, 77), 1000.0))
+    a, b = solver.rest(), solver.rest()
+    solver.step(a, b, [], 0.0, 0.1)
+
+
+def test_what_failed_once_fails_again(make_solver):
+    """A step refused for its viscosity leaves nothing half done."""
+    solver = make_solver(24, 24, viscosity=lambda t: -1.0 if t > 0.5 else 0.1)
+    a, b = solver.rest(), solver.rest()
+    solver.step(a, b, [], 0.0, 0.1)
+    for _ in range(2):
+        with pytest.raises(ValueError, match=r"viscosity at 1\.1 s -1\.0"):
+            solver.step(a, b, [], 1.0, 0.1)
