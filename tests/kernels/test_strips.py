@@ -1,5 +1,7 @@
 """Strips: threads that share the rows of a step compute what one thread does, and never wait for ever."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -167,3 +169,21 @@ def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
     solver.step(a, c, [FORCE], 0.0, 0.1)
     np.testing.assert_array_equal(b.velocity[0], expected)
     np.testing.assert_array_equal(c.velocity[0], expected)
+
+
+def test_a_forked_process_steps_with_threads_of_its_own(cpu):
+    """The child has inherited no helper; it must not wait for one."""
+    code = (
+        "import os, wfluid.solver as module\n"
+        "from wfluid import Fluid, Grid, Solver\n"
+        "from wfluid.device import open_device\n"
+        "module.SHARED_CELLS, module.free_cores = 0, lambda: 2\n"
+        "solver = Solver(Grid(64, 64), Fluid(), open_device())\n"
+        "a, b = solver.rest(), solver.rest()\n"
+        "solver.step(a, b, [], 0.0, 0.1)\n"
+        "child = os.fork()\n"
+        "solver.step(a, b, [], 0.0, 0.1)\n"
+        "os._exit(0) if child == 0 else print(os.waitpid(child, 0)[1])\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert result.stdout.strip() == "0", result.stderr
