@@ -126,7 +126,7 @@ def test_projection_is_self_adjoint(make_solver, walls):
 def test_diffusion_equals_a_sparse_direct_solve(make_solver, walls):
     """(1 - dt mu Lap) v' = v with the matrix assembled by SciPy, for both components.
 
-    For no-slip walls, where components are coupled, see test_viscosity.
+    For no-slip walls, where components are coupled, see test_viscosity_equations.
     """
     import scipy.sparse as sparse
     from scipy.sparse.linalg import spsolve
