@@ -9,25 +9,16 @@ from __future__ import annotations
 
 import warp as wp
 
-from wfluid.equations import FivePoint, Stress
+from wfluid.equations import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, Stress
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import relaxation, viscosity
 from wfluid.kernels.cells import Layout, Real
 from wfluid.kernels.strips import together
-from wfluid.linear import ITERATION_LIMIT, LinearSystem, Residual, Solve
+from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, vector
-
-FIVE_POINT_INTERVAL = (0.8, 1.0)
-"""Where the eigenvalues of a cycle times A lie for the five-point equations."""
-
-STRESS_INTERVAL = (0.65, 1.0)
-"""The same for the coupled equation, where viscosity is smooth: 0.78 constant, 0.72 at a contrast of 50."""
-
-JUMP_LIMIT = 10.0
-"""Jump of the coefficients within a few cells up to which cycles alone converge as for smooth ones."""
 
 
 class SeparateDiffusion:

@@ -25,6 +25,12 @@ SMOOTHED_STRESS = 0.14
 SWEEPS_STRESS = 2
 """Sweeps on each side of the coarse correction in the coupled equation."""
 
+FIVE_POINT_INTERVAL = (0.8, 1.0)
+"""Where the eigenvalues of a cycle times A lie for the five-point equations."""
+
+STRESS_INTERVAL = (0.65, 1.0)
+"""The same for the coupled equation, where viscosity is smooth: 0.78 constant, 0.72 at a contrast of 50."""
+
 
 class _Numbers:
     """Numbers in device memory by name, so that a captured graph follows them when they change."""

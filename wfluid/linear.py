@@ -25,6 +25,9 @@ from wfluid.state import Vector, vector
 SWEEP_LIMIT = 14
 """Chebyshev sweeps that cost about as much as two cycles."""
 
+JUMP_LIMIT = 10.0
+"""Jump of the coefficients within a few cells up to which cycles alone converge as for smooth ones."""
+
 ITERATION_LIMIT = 60
 """Most iterations of conjugate gradients: tens at contrasts of 1e4, so that more will not help."""
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from wfluid.diffusion import FIVE_POINT_INTERVAL, JUMP_LIMIT
-from wfluid.equations import FivePoint, Resisted
+from wfluid.equations import FIVE_POINT_INTERVAL, FivePoint, Resisted
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import projection, relaxation
 from wfluid.kernels.cells import Layout, Real
-from wfluid.linear import ITERATION_LIMIT, LinearSystem, Residual, Solve, largest
+from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve, largest
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, field

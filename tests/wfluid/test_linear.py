@@ -5,8 +5,7 @@ import pytest
 from oracles import laplacian_2d, sparse_laplacian
 
 from wfluid.chebyshev import chebyshev_count, chebyshev_factors
-from wfluid.diffusion import FIVE_POINT_INTERVAL
-from wfluid.equations import FivePoint
+from wfluid.equations import FIVE_POINT_INTERVAL, FivePoint
 from wfluid.grid import Grid
 from wfluid.linear import LinearSystem, Solve
 from wfluid.multigrid import Points, hierarchy
