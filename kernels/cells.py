@@ -124,22 +124,23 @@ class Program:
         inputs: Sequence,
         outputs: Sequence,
         rows: tuple[int, int] | None = None,
-        layers: int = 1,
+        boxes: wp.array | None = None,
     ) -> None:
         """Run the program on every cell of `layout`, or of its rows `rows[0]` to `rows[1]` - 1.
 
-        A layered program runs so for n = 0 … layers - 1.
+        A layered program runs for every n on the cells of its box: `boxes` holds, for each n, the
+        first column, the column after the last, the first row and the row after the last.
         """
         row, end = share(*(rows or (0, layout.ny)))
         if row == end:
             return
         spans = layout.nx if device.is_cuda else -(-layout.nx // self.span)
-        where = [row, end - row, spans, layout.first, layout.pitch]
+        layers = [] if boxes is None else [boxes, len(boxes) // 4]
         wp.launch(
             self.kernels["cuda" if device.is_cuda else "cpu"],
-            dim=layers * (end - row) * spans,
+            dim=(end - row) * spans,
             inputs=[*inputs],
-            outputs=[*outputs, *where],
+            outputs=[*outputs, *layers, row, spans, layout.first, layout.pitch],
             device=device,
         )
 
@@ -158,16 +159,32 @@ class Lines:
             wp.launch(kernel, dim=end - first, inputs=[*inputs], outputs=[*outputs, first], device=device)
 
 
-_CELLS = """def {name}({signature}, row_: int, rows_: int, spans_: int, first_: int, pitch_: int):
+_CELLS = """def {name}({signature}, row_: int, spans_: int, first_: int, pitch_: int):
     t = wp.tid()
     line = t // spans_
-    n = line // rows_
     i = (t - line * spans_) * SPAN
-    j = row_ + line - n * rows_
+    j = row_ + line
     k = first_ + j * pitch_ + i
 {hoisted}
     for c in range(SPAN):
-        func({layer}i + c, j, k + c, {arguments})
+        func(i + c, j, k + c, {arguments})
+"""
+
+_LAYERS = """def {name}(
+    {signature}, boxes_: Indices, layers_: int, row_: int, spans_: int, first_: int, pitch_: int
+):
+    t = wp.tid()
+    line = t // spans_
+    i = (t - line * spans_) * SPAN
+    j = row_ + line
+    k = first_ + j * pitch_ + i
+{hoisted}
+    for n in range(layers_):
+        box_ = 4 * n
+        rows_ = boxes_[box_ + 2] <= j and j < boxes_[box_ + 3]
+        if rows_ and boxes_[box_] < i + SPAN and i < boxes_[box_ + 1]:
+            for c in range(SPAN):
+                func(n, i + c, j, k + c, {arguments})
 """
 
 _LINES = """def {name}({signature}, first_: int):
@@ -180,10 +197,11 @@ _LINES = """def {name}({signature}, first_: int):
 def cells(program: Callable, span: int = SPAN, module: str = "wfluid") -> Program:
     """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell.
 
-    Programs outside this package name a module of their own, so that this one is not built again.
+    A layered program runs on whole spans: it must do nothing beyond its box within them. Programs
+    outside this package name a module of their own, so that this one is not built again.
     """
     layered = next(iter(inspect.signature(program).parameters)) == "n"
-    template = _CELLS.replace("{layer}", "n, " if layered else "")
+    template = _LAYERS if layered else _CELLS
     func, kernels = _kernels(
         program, skip=3 + layered, template=template, spans={"cpu": span, "cuda": 1}, module=module
     )
@@ -211,7 +229,7 @@ def _kernels(program, skip, template, spans, module):
         source = template.format(name=name, **source_of)
         file = f"<{kind} {program.__module__}.{program.__name__} {span}>"
         linecache.cache[file] = (len(source), None, source.splitlines(True), file)  # Warp reads the source
-        scope = {"wp": wp, "func": func, "SPAN": wp.constant(span)}
+        scope = {"wp": wp, "func": func, "SPAN": wp.constant(span), "Indices": Indices}
         for p in parameters:
             scope[f"annotation_{p.name}"] = hoisted[p.name][1] if p.name in hoisted else p.annotation
         exec(compile(source, file, "exec"), scope)

@@ -1,49 +1,62 @@
 """Forces: dv/dt = f, added to the velocity on the faces.
 
-A Gaussian force of centre c and radius sigma is g(x) times a vector, with
+Most forces are Gaussians of centre c and radius sigma, with r = (x - c) / sigma
 
-    g(x) = exp(-|x - c|^2 / 2 sigma^2) = exp(-(x - c_x)^2 / 2 sigma^2) exp(-(y - c_y)^2 / 2 sigma^2)
+    g(x) = exp(-|r|^2 / 2) = exp(-r_x^2 / 2) exp(-r_y^2 / 2)
+
+    push    p g                   a vector p
+    vortex  w (-r_y, r_x) g       without divergence
 
 so two profiles per axis, at faces and at centres, replace one exponential a cell. Over a step the
-velocity gains g times the force's impulse (its vector integrated over the step by the host, hence
-exact for every envelope and any dt). Beyond `CUT` radii g is below rounding and taken as zero.
+velocity gains the force's impulse (integrated over the step by the host, hence exact for every envelope
+and any dt). Beyond `CUT` radii g is below rounding and taken as zero: a force runs on the box of that
+size only.
 
-A force that a picture paints is a field on the faces, made once, times its impulse. A weight is a
-factor at centres, of which a face takes the mean of its two.
+Other forces are fields on the faces, made once, times their impulse; or a density, at centres, times a
+vector. A weight is a factor at centres, of which a face takes the mean of its two.
 """
 
 import warp as wp
-from wfluid.kernels.cells import Field, Real, Uniform, cells, entry, gather, inside, lines
+from wfluid.kernels.cells import Field, Real, RowReal, Uniform, cells, entry, gather, inside
 
 CUT = wp.constant(Real({"float32": 6.0, "float64": 9.0}[Real.__name__]))
 """Radii after which exp(-r^2/2) is below the rounding of one."""
 
 
-@lines
+@cells
 def profile(
-    t: int,
-    centre: Field,
-    radius: Field,
-    points: int,
+    i: int,
+    j: int,
+    k: int,
+    centre: RowReal,
+    radius: RowReal,
     start: Real,
     h: Real,
     period: Real,
     # outputs
-    out: Field,
+    r: Field,
+    g: Field,
 ):
-    """Gaussian of force t // points at the point (t % points + start) h of one axis.
+    """Distance [radii] and Gaussian of force j at the point (i + start) h of one axis.
 
     `period` is the length of a periodic axis, whose nearest image counts, and 0 between walls.
     """
-    force = t // points
-    d = (Real(t - force * points) + start) * h - centre[force]
+    k = inside(k)
+    d = (Real(i) + start) * h - centre
     if period > Real(0.0):
         d = d - period * wp.round(d / period)
-    r = d / radius[force]
-    g = Real(0.0)
-    if wp.abs(r) < CUT:
-        g = wp.exp(Real(-0.5) * r * r)
-    out[t] = g
+    s = d / radius
+    value = Real(0.0)
+    if wp.abs(s) < CUT:
+        value = wp.exp(Real(-0.5) * s * s)
+    r[k] = s
+    g[k] = value
+
+
+@wp.func
+def in_profile(n: int, i: int, pitch: int):
+    """Index of point i of force n in a table of profiles."""
+    return entry((n + 2) * pitch + i + 2)
 
 
 @cells
@@ -66,26 +79,45 @@ def push(
     i: int,
     j: int,
     k: int,
-    impulse_x: Field,
-    impulse_y: Field,
+    push_x: Field,
+    push_y: Field,
+    turn: Field,
     face_x: Field,
     centre_x: Field,
     centre_y: Field,
     face_y: Field,
-    nx: int,
-    ny: int,
+    r_x: Field,
+    r_y: Field,
+    pitch_x: int,
+    pitch_y: int,
     # outputs
     u: Field,
     v: Field,
 ):
-    """Add the impulse [L/s] of force n to the x-face and y-face of cell k, in place."""
+    """Add what force n gains [L/s] on the x-face and the y-face of cell k, in place."""
     k = inside(k)
-    row = n * ny + j
-    on_u = gather(impulse_x, n) * gather(centre_y, row)
-    on_v = gather(impulse_y, n) * gather(face_y, row)
-    column = entry(n * nx + wp.min(i, nx - 1))
-    wp.atomic_add(u, k, on_u * gather(face_x, column))
-    wp.atomic_add(v, k, on_v * gather(centre_x, column))
+    column = in_profile(n, i, pitch_x)
+    row = in_profile(n, j, pitch_y)
+    on_u = (gather(push_x, n) - gather(turn, n) * gather(r_y, row)) * gather(centre_y, row)
+    on_v = gather(push_y, n) + gather(turn, n) * gather(r_x, column)
+    u[k] = u[k] + on_u * gather(face_x, column)
+    v[k] = v[k] + on_v * gather(centre_x, column) * gather(face_y, row)
+
+
+@cells
+def lift(
+    i: int,
+    j: int,
+    k: int,
+    rho: Field,
+    impulse: Uniform,
+    before: int,
+    # outputs
+    u: Field,
+):
+    """Add a density's buoyancy to one component, in place: impulse times its mean at k and k - `before`."""
+    k = inside(k)
+    u[k] = u[k] + impulse * Real(0.5) * (rho[k] + rho[inside(k - before)])
 
 
 @cells

@@ -54,6 +54,19 @@ def total_of(rows: Field, count: int):
 
 
 @lines
+def mean_of(
+    t: int,
+    rows: Field,
+    count: int,
+    cells: int,
+    # outputs
+    mean: Field,
+):
+    """The sum of the rows over a number of cells."""
+    mean[0] = total_of(rows, count) / Real(cells)
+
+
+@lines
 def begin(
     t: int,
     residual_rows: Field,

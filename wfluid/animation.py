@@ -9,10 +9,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from wfluid.controls import STEP_LIMIT, Force
+from wfluid.controls import STEP_LIMIT
 from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
 from wfluid.device import open_device
 from wfluid.fluid import Fluid
+from wfluid.forces import Force, Group
 from wfluid.grid import LEAST_CELLS, Grid
 from wfluid.linear import ITERATION_LIMIT
 from wfluid.look_up import LookUp, check_look_up
@@ -131,7 +132,7 @@ class Animation:
     """What is animated."""
     fluid: Fluid
     """What it is made of."""
-    forces: Sequence[Force]
+    forces: Sequence[Force | Group]
     """What moves it."""
     timeline: Timeline
     """When frames are shown, and how many steps lie between."""
@@ -212,7 +213,7 @@ class Animation:
 def animate(
     picture: Picture,
     fluid: Fluid,
-    forces: Sequence[Force],
+    forces: Sequence[Force | Group],
     duration: float,
     fps: float = 24.0,
     substeps: int | None = None,

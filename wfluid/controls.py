@@ -7,62 +7,76 @@ from collections.abc import Sequence
 import numpy as np
 import warp as wp
 
-from wfluid.forces import FORCE_LIMIT, GaussianForce
+from wfluid.blobs import Blobs
+from wfluid.forces import FORCE_LIMIT, Blob, BlobForce, Buoyancy, FieldForce, Force, Growth
 from wfluid.grid import Grid
-from wfluid.image_force import ImageForce
 from wfluid.kernels import forces as kernels
+from wfluid.kernels import sources
 from wfluid.kernels.cells import Layout, Real
 from wfluid.kernels.strips import alone
 from wfluid.painted import Painted
-from wfluid.state import Vector, field, from_numpy, vector
+from wfluid.state import State, Vector, field, from_numpy, vector
 from wfluid.walls import Ghosts, Walls
 
 STEP_LIMIT = 10.0
 """Longest step the solver is tested with [s]."""
 
-_PER_FORCE = 5
-"""Numbers of a Gaussian force on the device: center, radius and impulse."""
-
-Force = GaussianForce | ImageForce
-"""Anything that pushes the fluid."""
+_STEP = 6
+"""Numbers of the step itself: dt / h and kept / h along both axes, kept, mean divergence."""
 
 
 class Controls:
-    """The numbers of a step with forces of certain kinds, in one device array, and how they push.
+    """The numbers of a step with forces of certain kinds, and how they move the fluid.
 
     Gaussian forces with the same weight are pushed together.
     """
 
-    def __init__(self, forces: Sequence[Force], grid: Grid, walls: Walls, device: wp.Device):
+    def __init__(
+        self, forces: Sequence[Force], densities: Sequence[str], grid: Grid, walls: Walls, device: wp.Device
+    ):
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
-        self._groups: dict[int, _Group] = {}
-        self._images: list[tuple[int, Vector]] = []
-        for index, force in enumerate(forces):
-            if isinstance(force, GaussianForce):
-                self._groups.setdefault(id(force.weight), _Group(force.weight)).members.append(index)
-            else:
-                self._images.append(
-                    (index, _uploaded(force.on_faces(grid, walls.periodic), self.layout, device))
-                )
         self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
-        numbers = 5 + len(self._images) + _PER_FORCE * sum(len(g.members) for g in self._groups.values())
-        self._numbers = wp.zeros(numbers, dtype=Real, device=device)
-        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept, *self._image_impulses = (
-            self._numbers[n : n + 1] for n in range(5 + len(self._images))
-        )
-        start = 5 + len(self._images)
-        for group in self._groups.values():
-            start = group.allocate(self._numbers, start, grid, walls, self.layout, device)
+        self._pushes = [
+            _Push(weight, numbers, grid, walls, device) for weight, numbers in _by_weight(self._forces)
+        ]
+        self._growths = [n for n, force in enumerate(forces) if isinstance(force, Growth)]
+        self._swelling = Blobs(len(self._growths), grid, walls, device) if self._growths else None
+        self._fields: list[tuple[int, Vector]] = []
+        self._lifts: list[tuple[int, int]] = []
+        for n, force in enumerate(forces):
+            if isinstance(force, FieldForce):
+                self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
+            elif isinstance(force, Buoyancy):
+                self._lifts.append((n, _index_of(force.density, densities)))
+        count = _STEP + len(self._fields) + 2 * len(self._lifts)
+        self._numbers = wp.zeros(count, dtype=Real, device=device)
+        numbers = [self._numbers[n : n + 1] for n in range(count)]
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept, self._mean = numbers[:_STEP]
+        self._field_impulses = numbers[_STEP : _STEP + len(self._fields)]
+        self._lift_impulses = numbers[_STEP + len(self._fields) :]
+        self.prescribed = self.removed = 0.0
+
+    prescribed: float
+    """Sum of the largest divergences that the last step's sources prescribe [1/s]."""
+    removed: float
+    """The part of it that has no place between the walls: its mean, taken off everywhere [1/s]."""
 
     @staticmethod
     def key(forces: Sequence[Force]) -> tuple:
         """What controls are made for: forces of one key differ in numbers only."""
-        return tuple(id(f.weight) if isinstance(f, GaussianForce) else (id(f),) for f in forces)
+        return tuple(
+            (isinstance(f, Growth), id(f.weight)) if isinstance(f, BlobForce) else (id(f),) for f in forces
+        )
 
     @property
     def pushes(self) -> bool:
-        """Whether there is any force."""
-        return bool(self._forces)
+        """Whether anything adds to the velocity."""
+        return bool(self._pushes or self._fields or self._lifts)
+
+    @property
+    def swells(self) -> bool:
+        """Whether any force prescribes divergence."""
+        return self._swelling is not None
 
     def set(self, forces: Sequence[Force], t: float, dt: float, until: float, kept: float = 0.0) -> None:
         """Put a step of dt, in which forces act from t to `until`, on the device.
@@ -72,95 +86,115 @@ class Controls:
         Raises:
             ValueError: a force that would add more than the limit, with the force and the limit.
         """
-        impulses = [force.envelope.integral(t, until) for force in forces]
-        for force, impulse in zip(forces, impulses, strict=True):
-            gained = force.reach * abs(impulse)
-            if not gained <= FORCE_LIMIT * STEP_LIMIT:
-                at = f"the force at {force.center}" if isinstance(force, GaussianForce) else "a painted force"
-                raise ValueError(
-                    f"{at} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
-                    f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
-                )
+        blobs = {n: force.over(t, until) for n, force in enumerate(forces) if isinstance(force, BlobForce)}
+        for blob in blobs.values():
+            gained = max(blob.gained, abs(blob.swell) * blob.radius)
+            _check(f"the force at {blob.center}", gained, t, until)
+        for push in self._pushes:
+            push.blobs.set([blobs[n] for n in push.members])
         hx, hy = self.grid.hx, self.grid.hy
-        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
-        numbers += [impulses[index] for index, _ in self._images]
-        for group in self._groups.values():
-            numbers += group.numbers([forces[n] for n in group.members], [impulses[n] for n in group.members])
+        numbers = [
+            dt / hx,
+            dt / hy,
+            kept / hx,
+            kept / hy,
+            kept,
+            self._swell([blobs[n] for n in self._growths]),
+        ]
+        integrals: dict[int, list[float]] = {}
+        for n, _ in self._fields:
+            if n not in integrals:
+                integrals[n] = forces[n].integrals(t, until)
+                gained = forces[n].reach * max(map(abs, integrals[n]))
+                _check("a force over the picture", gained, t, until)
+                numbers += integrals[n]
+        for n, _ in self._lifts:
+            impulse = forces[n].envelope.integral(t, until)
+            _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
+            numbers += [impulse * component for component in forces[n].vector]
         self._numbers.assign(np.array(numbers))
 
-    def push(self, velocity: Vector, out: Vector) -> None:
-        """Out = the velocity and the forces' impulses, without ghosts: launches only."""
-        for f, to in zip(velocity, out, strict=True):
+    def _swell(self, blobs: Sequence[Blob]) -> float:
+        """Put the growths on the device; the mean of the divergence they prescribe [1/s]."""
+        if not self._swelling:
+            return 0.0
+        self._swelling.set(blobs)
+        self.prescribed, self.removed = (
+            sum(abs(blob.swell) for blob in blobs),
+            self._swelling.swell_mean(blobs),
+        )
+        return self.removed
+
+    def push(self, state: State, out: Vector) -> None:
+        """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
+        for f, to in zip((state.u, state.v), out, strict=True):
             kernels.copied.launch(self.layout, self.device, [f], [to])
-        self._add_impulses(out)
-
-    def _add_impulses(self, velocity: Vector) -> None:
-        for (_, fields), impulse in zip(self._images, self._image_impulses, strict=True):
-            for f, component in zip(fields, velocity, strict=True):
+        for (_, fields), impulse in zip(self._fields, self._field_impulses, strict=True):
+            for f, component in zip(fields, out, strict=True):
                 kernels.push_field.launch(self.layout, self.device, [f, impulse], [component])
-        for group in self._groups.values():
-            group.push(self.grid, self.layout, velocity, self.device)
+        for position, (_, density) in enumerate(self._lifts):
+            impulses = self._lift_impulses[2 * position : 2 * position + 2]
+            for impulse, component, before in zip(impulses, out, (1, self.layout.pitch), strict=True):
+                inputs = [state.rho[density], impulse, before]
+                kernels.lift.launch(self.layout, self.device, inputs, [component])
+        for push in self._pushes:
+            push.add(out)
+
+    def prescribe(self, b: wp.array) -> None:
+        """Add the divergence that is to stay to b = -div v, in place: launches only."""
+        self._swelling.swell(b)
+        sources.lower.launch(self.layout, self.device, [self._mean], [b])
 
 
-class _Group:
+class _Push:
     """Gaussian forces with one weight."""
 
-    def __init__(self, weight: Painted | None):
-        self.weight = weight
-        self.members: list[int] = []
+    def __init__(
+        self, weight: Painted | None, members: list[int], grid: Grid, walls: Walls, device: wp.Device
+    ):
+        self.members, self.weight, self.device = members, weight, device
+        self.layout = Layout(grid.nx, grid.ny)
+        self.blobs = Blobs(len(members), grid, walls, device)
+        if weight is not None:
+            self._weights = field(self.layout, device)
+            from_numpy(weight.on(grid), self._weights, self.layout)
+            Ghosts(self.layout, walls.centre_rules(), device).fill(self._weights)
+            self._gained = vector(self.layout, device, 2)
 
-    def allocate(
-        self, numbers: wp.array, start: int, grid: Grid, walls: Walls, layout: Layout, device: wp.Device
-    ) -> int:
-        """Take the part of `numbers` that begins at `start`; where the next one begins."""
-        count = len(self.members)
-        self.center_x, self.center_y, self.radius, self.impulse_x, self.impulse_y = (
-            numbers[start + n * count : start + (n + 1) * count] for n in range(_PER_FORCE)
-        )
-        self.profiles = tuple(
-            wp.zeros(count * n, dtype=Real, device=device) for n in (grid.nx, grid.nx, grid.ny, grid.ny)
-        )
-        periodic_x, periodic_y = walls.periodic
-        self.periods = (grid.width * periodic_x, grid.height * periodic_y)
-        if self.weight is not None:
-            self.weights = field(layout, device)
-            from_numpy(self.weight.on(grid), self.weights, layout)
-            Ghosts(layout, walls.centre_rules(), device).fill(self.weights)
-            self.gained = vector(layout, device, 2)
-        return start + _PER_FORCE * count
+    def add(self, velocity: Vector) -> None:
+        """Add what they gain to the velocity, in place: launches only."""
+        if self.weight is None:
+            self.blobs.push(velocity)
+            return
+        gained = self._gained
+        alone(lambda: [f.zero_() for f in gained])
+        self.blobs.push(gained)
+        for f, component, before in zip(gained, velocity, (1, self.layout.pitch), strict=True):
+            kernels.push_weighted.launch(self.layout, self.device, [f, self._weights, before], [component])
 
-    def numbers(self, forces: Sequence[GaussianForce], impulses: Sequence[float]) -> list[float]:
-        """The forces' numbers in the order of the device's arrays."""
-        pairs = list(zip(forces, impulses, strict=True))
-        return [
-            *(force.center[0] for force in forces),
-            *(force.center[1] for force in forces),
-            *(force.radius for force in forces),
-            *(force.vector[0] * impulse for force, impulse in pairs),
-            *(force.vector[1] * impulse for force, impulse in pairs),
-        ]
 
-    def push(self, grid: Grid, layout: Layout, velocity: Vector, device: wp.Device) -> None:
-        """Add the group's impulses to the velocity, in place."""
-        count = len(self.members)
-        axes = (
-            (self.center_x, grid.nx, 0.0, grid.hx, self.periods[0]),
-            (self.center_x, grid.nx, 0.5, grid.hx, self.periods[0]),
-            (self.center_y, grid.ny, 0.5, grid.hy, self.periods[1]),
-            (self.center_y, grid.ny, 0.0, grid.hy, self.periods[1]),
+def _by_weight(forces: Sequence[Force]) -> list[tuple[Painted | None, list[int]]]:
+    """The weights of Gaussian pushes, each with the numbers of its forces."""
+    found: dict[int, tuple[Painted | None, list[int]]] = {}
+    for n, force in enumerate(forces):
+        if isinstance(force, BlobForce) and not isinstance(force, Growth):
+            found.setdefault(id(force.weight), (force.weight, []))[1].append(n)
+    return list(found.values())
+
+
+def _index_of(name: str, densities: Sequence[str]) -> int:
+    if name not in densities:
+        there = ", ".join(densities) or "none"
+        raise ValueError(f"buoyancy reads the density {name!r}: expected one of the fluid's ({there})")
+    return list(densities).index(name)
+
+
+def _check(what: str, gained: float, t: float, until: float) -> None:
+    if not gained <= FORCE_LIMIT * STEP_LIMIT:
+        raise ValueError(
+            f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
+            f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
         )
-        for (center, points, start, h, period), profile in zip(axes, self.profiles, strict=True):
-            inputs = [center, self.radius, points, start, h, period]
-            kernels.profile.launch(count * points, device, inputs, [profile])
-        to = velocity
-        if self.weight is not None:
-            to = self.gained
-            alone(lambda: [f.zero_() for f in to])
-        inputs = [self.impulse_x, self.impulse_y, *self.profiles, grid.nx, grid.ny]
-        kernels.push.launch(layout, device, inputs, to, layers=count)
-        if self.weight is not None:
-            for gained, component, before in zip(to, velocity, (1, layout.pitch), strict=True):
-                kernels.push_weighted.launch(layout, device, [gained, self.weights, before], [component])
 
 
 def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:

@@ -12,13 +12,83 @@ import warp as wp
 from wfluid.equations import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, Stress
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
-from wfluid.kernels import relaxation, viscosity
+from wfluid.kernels import krylov, relaxation, sources, viscosity
 from wfluid.kernels.cells import Layout, Real
 from wfluid.kernels.strips import together
 from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, vector
+
+
+class ScalarDiffusion:
+    """(1 - dt mu Lap) f' = f for one field and constant mu.
+
+    With `conserved`, for densities, the sum of f is kept to rounding however far the solve goes. The
+    weights of its sweeps are one number, so they keep it; the little that cycles on grids of odd sizes
+    change is taken off evenly.
+    """
+
+    def __init__(self, grid: Grid, fluid: Fluid, points: Points, device: wp.Device, conserved: bool = False):
+        self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
+        self._conserved = conserved
+        if conserved:
+            self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=device)
+            self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
+            self._mean = wp.zeros(1, dtype=Real, device=device)
+        size = (grid.width, grid.height)
+        levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
+        self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL)
+        self.how = Solve("none", 0)
+        self._change, self._answer = (vector(self.layout, device, 1) for _ in range(2))
+        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._dt_mu = -1.0
+
+    def plan(self, dt_mu: float) -> Solve:
+        """Make ready for steps of dt times mu; what the solve will be, "none" where nothing diffuses."""
+        if dt_mu == self._dt_mu:
+            return self.how
+        self.how = Solve("none", 0)
+        if dt_mu > 0:
+            for level in self.system.levels:
+                level.set_coefficients(1.0, dt_mu)
+            self.system.invert_coarsest()
+            self.how = self._choose()
+            self.system.prepare(self.how)
+        self._dt_mu = dt_mu
+        return self.how
+
+    def _choose(self) -> Solve:
+        if self.fluid.solver == "jacobi":
+            return Solve("jacobi", self.fluid.sweeps)
+        top, tolerance = self.system.levels[0], self.fluid.diffusion_tolerance
+        sweeps = self.system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
+        return sweeps or self.system.plan_cycles(tolerance)
+
+    def diffuse(self, f: wp.array, out: wp.array) -> None:
+        """Out = f (with ghosts) diffused, with ghosts."""
+        top = self.system.levels[0]
+        top.residual((f,), (f,), self._change)
+        self.system.solve(self.how, self._change, self._answer)
+        if self._conserved and self.how.method == "multigrid":
+            self._balance(*self._answer)
+        inputs = [f, *self._answer, self._one]
+        relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
+        top.fill((out,))
+
+    def _balance(self, change: wp.array) -> None:
+        """Take its mean off a change."""
+        nx, ny, device = self.layout.nx, self.layout.ny, self.device
+        inputs = [change, self._ones, nx, self.layout.pitch, 0]
+        krylov.row_products.launch(ny, device, inputs, [self._rows])
+        krylov.mean_of.launch(1, device, [self._rows, ny, nx * ny], [self._mean])
+        sources.lower.launch(self.layout, device, [self._mean], [change])
+
+    def measure(self) -> Residual:
+        """What the last solve left, relative to the change it made."""
+        if not self.how.iterations:
+            return Residual("none", 0, 0.0, 0.0)
+        return self.system.measure(self.how, self._change, self._answer)
 
 
 class SeparateDiffusion:
@@ -29,60 +99,30 @@ class SeparateDiffusion:
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
-        self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
-        size, walls = (grid.width, grid.height), fluid.walls
-        grids = hierarchy(grid.nx, grid.ny, size)
-        components = (Points(walls.u_rules(), (True, False)), Points(walls.v_rules(), (False, True)))
-        self.systems = [
-            LinearSystem([FivePoint(*n, size, points, device) for n in grids], device, FIVE_POINT_INTERVAL)
-            for points in components
-        ]
-        self.how = Solve("none", 0)
-        self.out, self._change, self._answer = (vector(self.layout, device, 2) for _ in range(3))
-        self._one = wp.array([1.0], dtype=Real, device=device)
-        self._dt = -1.0
+        self.fluid, walls = fluid, fluid.walls
+        points = (Points(walls.u_rules(), (True, False)), Points(walls.v_rules(), (False, True)))
+        self.components = [ScalarDiffusion(grid, fluid, own, device) for own in points]
+        self.out = vector(Layout(grid.nx, grid.ny), device, 2)
+
+    @property
+    def how(self) -> Solve:
+        """How both are solved."""
+        return self.components[0].how
 
     def plan(self, dt: float) -> Solve:
         """Make ready for steps of dt; what the solve will be, "none" where nothing diffuses."""
-        if dt == self._dt:
-            return self.how
-        if self.fluid.viscosity * dt == 0:
-            self.how, self._dt = Solve("none", 0), dt
-            return self.how
-        for system in self.systems:
-            for level in system.levels:
-                level.set_coefficients(1.0, dt * self.fluid.viscosity)
-            system.invert_coarsest()
-            self.how = self._choose(system)
-            system.prepare(self.how)
-        self._dt = dt
+        for component in self.components:
+            component.plan(dt * self.fluid.viscosity)
         return self.how
-
-    def _choose(self, system: LinearSystem) -> Solve:
-        if self.fluid.solver == "jacobi":
-            return Solve("jacobi", self.fluid.sweeps)
-        top, tolerance = system.levels[0], self.fluid.diffusion_tolerance
-        sweeps = system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
-        return sweeps or system.plan_cycles(tolerance)
 
     def diffuse(self, velocity: Vector) -> None:
         """Out = the velocity (with ghosts) diffused, with ghosts."""
-        for axis, f in enumerate(velocity):
-            self._diffuse_component(axis, f)
-
-    def _diffuse_component(self, axis: int, f: wp.array) -> None:
-        system, change, answer = self.systems[axis], (self._change[axis],), (self._answer[axis],)
-        system.levels[0].residual((f,), (f,), change)
-        system.solve(self.how, change, answer)
-        inputs = [f, *answer, self._one]
-        relaxation.add_scaled.launch(self.layout, self.device, inputs, [self.out[axis]])
-        system.levels[0].fill((self.out[axis],))
+        for component, f, out in zip(self.components, velocity, self.out, strict=True):
+            component.diffuse(f, out)
 
     def measure(self) -> Residual:
         """What the last solve for u left, relative to the change it made."""
-        if not self.how.iterations:
-            return Residual("none", 0, 0.0, 0.0)
-        return self.systems[0].measure(self.how, self._change[:1], self._answer[:1])
+        return self.components[0].measure()
 
 
 class CoupledDiffusion:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.density import Density
 from wfluid.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
 from wfluid.walls import Wall, Walls
 
@@ -29,6 +31,8 @@ class Fluid:
     """Whether a painted viscosity moves with the picture, instead of staying where it is painted."""
     freeze: Freeze | None = None
     """What holds parts of the picture in place."""
+    densities: Sequence[Density] = ()
+    """What is dissolved in it: ink, smoke; each with a name of its own."""
     walls: Walls | str = field(default_factory=Walls)
     """Condition at the picture's edges: a `Walls`, or "free-slip", "no-slip", "periodic" or two of
     them as "x,y"."""
@@ -54,6 +58,11 @@ class Fluid:
                 check_painted(painted.values)
         if self.freeze is not None and not isinstance(self.freeze, Freeze):
             raise TypeError(f"freeze: expected Freeze(mask), got {type(self.freeze).__name__}")
+        object.__setattr__(self, "densities", tuple(self.densities))
+        if not all(isinstance(density, Density) for density in self.densities):
+            raise TypeError("densities: expected Density objects")
+        if len(set(self.density_names)) < len(self.densities):
+            raise ValueError(f"densities {', '.join(self.density_names)}: two have one name")
         _one_of("scheme", self.scheme, SCHEMES)
         if self.solver is None:
             object.__setattr__(self, "solver", "jacobi" if self.scheme == "paper" else "multigrid")
@@ -63,6 +72,11 @@ class Fluid:
                 raise ValueError(f"{name} {getattr(self, name)}: expected a whole number from 1 on")
         if not 1e-12 <= self.diffusion_tolerance <= 0.5:
             raise ValueError(f"diffusion_tolerance {self.diffusion_tolerance}: expected 1e-12 … 0.5")
+
+    @property
+    def density_names(self) -> tuple[str, ...]:
+        """What the densities are called."""
+        return tuple(density.name for density in self.densities)
 
     @property
     def uniform(self) -> bool:

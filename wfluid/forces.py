@@ -1,165 +1,108 @@
-"""Forces and their course in time, as frozen descriptions.
+"""What moves the fluid, as frozen descriptions: a shape in space times an envelope in time.
 
-A force is a shape in space times an envelope in time. The solver asks an envelope for its integral
-over a step, so that the impulse of a force does not depend on the step.
+Most shapes are Gaussians g = exp(-|x - c|^2 / 2 sigma^2) about a center c that may move, or such times a
+low power of x - c: `Blob` holds the numbers of one over a step. The others are fields over the whole
+picture (`Field`), made once.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from wfluid.envelopes import Constant, Envelope, finite, product
+from wfluid.grid import Grid
 from wfluid.painted import Painted
+from wfluid.paths import Center, Path, Place, as_center, place, place_at
+from wfluid.walls import Walls
 
 FORCE_LIMIT = 1e4
 """Largest force the solver is tested with [longer side/s^2]."""
 
-
-class Envelope(Protocol):
-    """A force's course in time."""
-
-    def integral(self, start: float, end: float) -> float:
-        """Integral over the step from `start` to `end` [s]; an instant on `start` counts, on `end` not."""
-        ...
+RATE_LIMIT = 100.0
+"""Largest prescribed divergence the solver is tested with [1/s]."""
 
 
 @dataclass(frozen=True)
-class Instantaneous:
-    """A blow at one moment: the force's vector is the velocity gained [longer side/s] (paper, III)."""
+class Blob:
+    """What a Gaussian of one force does over one step; r = (x - center) / radius, g = exp(-r^2 / 2)."""
 
-    at: float = 0.0
-    """When [s]."""
+    center: Place
+    """Where it is [longer side]."""
+    radius: float
+    """Sigma [longer side]."""
+    push: Place = (0.0, 0.0)
+    """Velocity gained at the center: push g [longer side/s]."""
+    turn: float = 0.0
+    """Velocity gained around it: turn (-r_y, r_x) g [longer side/s]."""
+    swell: float = 0.0
+    """Divergence prescribed at the step's end: swell (1 - r^2 / 2) g [1/s]."""
+    amount: float = 0.0
+    """Density gained: amount g."""
 
-    def __post_init__(self) -> None:
-        _finite("Instantaneous.at", self.at)
-
-    def integral(self, start: float, end: float) -> float:
-        """1 for the step that begins at or before the moment and ends after it, else 0."""
-        return 1.0 if start <= self.at < end else 0.0
-
-
-@dataclass(frozen=True)
-class Constant:
-    """A steady force from `start` to `end` (paper, III)."""
-
-    start: float = 0.0
-    """When it begins [s]."""
-    end: float = math.inf
-    """When it ends [s]."""
-
-    def __post_init__(self) -> None:
-        _finite("Constant.start", self.start)
-        if not self.end > self.start:
-            raise ValueError(f"Constant: end {self.end} is not after start {self.start}")
-
-    def integral(self, start: float, end: float) -> float:
-        """The part of the step inside the window [s]."""
-        return max(0.0, min(end, self.end) - max(start, self.start))
+    @property
+    def gained(self) -> float:
+        """Bound of the velocity that the step gains [longer side/s]."""
+        return math.hypot(*self.push) + abs(self.turn)
 
 
-@dataclass(frozen=True)
-class Arbitrary:
-    """Any course in time: a function of the time, or samples with straight lines between (paper, III)."""
+class Force(ABC):
+    """Anything that moves the fluid."""
 
-    function: Callable[[float], float] | None = None
-    """Factor at a time [s]; integrated over a step by Simpson's rule."""
-    times: Sequence[float] = ()
-    """Times of the samples [s], increasing; zero before the first and after the last."""
-    values: Sequence[float] = ()
-    """Factors at `times`."""
+    envelope: Envelope
+    weight: Painted | None = None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "times", tuple(float(t) for t in self.times))
-        object.__setattr__(self, "values", tuple(float(v) for v in self.values))
-        if (self.function is None) == (not self.times):
-            raise ValueError("Arbitrary: expected either a function or samples")
-        if len(self.times) != len(self.values) or len(self.times) == 1:
-            raise ValueError(
-                f"Arbitrary: {len(self.times)} times and {len(self.values)} values: need equal, 2 or more"
-            )
-        if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise ValueError("Arbitrary: times do not increase")
-        for value in (*self.times, *self.values):
-            _finite("Arbitrary sample", value)
-
-    def integral(self, start: float, end: float) -> float:
-        """Exact for samples; fourth order in the step for a function."""
-        if self.function is not None:
-            middle = self.function((start + end) / 2)
-            return (end - start) / 6 * (self.function(start) + 4 * middle + self.function(end))
-        knots = sorted({start, end, *(t for t in self.times if start < t < end)})
-        return sum((b - a) * self._at((a + b) / 2) for a, b in itertools.pairwise(knots))
-
-    def _at(self, t: float) -> float:
-        if not self.times[0] <= t <= self.times[-1]:
-            return 0.0
-        n = min(bisect_right(self.times, t), len(self.times) - 1)
-        t0, t1, v0, v1 = self.times[n - 1], self.times[n], self.values[n - 1], self.values[n]
-        return v0 + (v1 - v0) * (t - t0) / (t1 - t0)
+    def under(self, envelope: Envelope) -> Force:
+        """The same force with its envelope multiplied by another."""
+        return replace(self, envelope=product(self.envelope, envelope))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Oscillator:
-    """A sin(2 pi (t / T + phase)), the paper's oscillator (its k is 1 / T).
+class BlobForce(Force):
+    """A force whose shape is a Gaussian's."""
 
-    Phase 0 is the paper's sine: from rest it gives a velocity that never turns back, and the picture
-    walks away from its place. A quarter (a cosine) gives one that swings, from the place to one side;
-    `centred` then makes it swing about the place, by A (T / 2 pi)^2 to either side in a free flow: half
-    the force for the first half period brings it to the turning point at rest.
-    """
+    @abstractmethod
+    def over(self, start: float, end: float) -> Blob:
+        """What it does from `start` to `end` [s]."""
 
-    amplitude: float = 1.0
-    """A: the factor's largest value."""
-    period: float = 1.0
-    """T [s]."""
-    phase: float = 0.25
-    """Part of a period by which it is ahead, 0 … 1."""
-    start: float = 0.0
-    """When it begins [s]; the phase counts from there."""
-    end: float = math.inf
-    """When it ends [s]."""
-    centred: bool = True
-    """Whether the first half period has half the amplitude. Meant for the phases 0.25 and 0.75."""
 
-    def __post_init__(self) -> None:
-        for name in ("amplitude", "phase", "start"):
-            _finite(f"Oscillator.{name}", getattr(self, name))
-        if not (math.isfinite(self.period) and self.period > 0):
-            raise ValueError(f"Oscillator: period {self.period} is not positive")
-        if not self.end > self.start:
-            raise ValueError(f"Oscillator: end {self.end} is not after start {self.start}")
+class FieldForce(Force):
+    """A force that is a field over the picture times an envelope; or a sum of such."""
 
-    def integral(self, start: float, end: float) -> float:
-        """Closed form, so right for periods shorter than a step too."""
-        a, b = max(start, self.start) - self.start, min(end, self.end) - self.start
-        if b <= a:
-            return 0.0
-        total = self._primitive(b) - self._primitive(a)
-        half = self.period / 2 if self.centred else 0.0
-        if a < half:
-            total -= (self._primitive(min(b, half)) - self._primitive(a)) / 2
-        return total
+    @abstractmethod
+    def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Accelerations [longer side/s^2] along x, y on the first nx x-faces and ny y-faces, each (ny, nx).
 
-    def _primitive(self, s: float) -> float:
-        w = 2 * math.pi / self.period
-        return -self.amplitude / w * math.cos(w * s + 2 * math.pi * self.phase)
+        On closed walls they are 0.
+        """
+
+    @property
+    @abstractmethod
+    def reach(self) -> float:
+        """Bound of the acceleration [longer side/s^2]."""
+
+    def integrals(self, start: float, end: float) -> list[float]:
+        """What each field is multiplied by over a step [s]."""
+        return [self.envelope.integral(start, end)]
 
 
 @dataclass(frozen=True)
-class GaussianForce:
+class GaussianForce(BlobForce):
     """A push around a point: vector exp(-|x - center|^2 / 2 radius^2) times the envelope.
+
+    A moving center is taken at the middle of a step: second order in the step.
 
     Raises:
         ValueError: a value that is not finite, a radius that is not positive, or a vector beyond
             1e4 longer sides/s^2.
     """
 
-    center: tuple[float, float]
-    """Point (x, y) [longer side]."""
+    center: Center
+    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
     vector: tuple[float, float]
     """Acceleration at the center [longer side/s^2]; for `Instantaneous` the velocity gained."""
     radius: float
@@ -170,26 +113,260 @@ class GaussianForce:
     """Where it acts: a factor painted over the picture."""
 
     def __post_init__(self) -> None:
-        for name in ("center", "vector"):
-            values = tuple(float(value) for value in getattr(self, name))
-            if len(values) != 2:
-                raise ValueError(f"GaussianForce.{name}: expected two numbers, got {len(values)}")
-            for value in values:
-                _finite(f"GaussianForce.{name}", value)
-            object.__setattr__(self, name, values)
-        if math.hypot(*self.vector) > FORCE_LIMIT:
-            raise ValueError(
-                f"force of {math.hypot(*self.vector):g}: the limit is {FORCE_LIMIT:g} longer sides/s^2"
-            )
-        if not (math.isfinite(self.radius) and self.radius > 0):
-            raise ValueError(f"GaussianForce.radius {self.radius}: expected a positive number")
+        object.__setattr__(self, "center", as_center("GaussianForce.center", self.center))
+        object.__setattr__(self, "vector", place("GaussianForce.vector", self.vector))
+        _limited("force", math.hypot(*self.vector))
+        _positive("GaussianForce.radius", self.radius)
+
+    def over(self, start: float, end: float) -> Blob:
+        """The vector times the envelope's integral."""
+        impulse = self.envelope.integral(start, end)
+        push = (self.vector[0] * impulse, self.vector[1] * impulse)
+        return Blob(place_at(self.center, (start + end) / 2), self.radius, push=push)
+
+
+@dataclass(frozen=True)
+class VortexForce(BlobForce):
+    """A twirl: spin (-(y - center_y), x - center_x) exp(-|x - center|^2 / 2 radius^2) times the envelope.
+
+    It is free of divergence, so that no pressure takes a part of it: in a free flow the center turns by
+    the double integral of spin times envelope. Positive spins turn clockwise on the screen (x towards y).
+
+    Raises:
+        ValueError: as `GaussianForce`; the limit holds for spin times radius.
+    """
+
+    center: Center
+    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    spin: float
+    """Angular acceleration at the center [rad/s^2]; for `Instantaneous` the angular velocity gained."""
+    radius: float
+    """Sigma of the Gaussian [longer side]; the force is strongest there, spin radius exp(-1/2)."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", as_center("VortexForce.center", self.center))
+        _positive("VortexForce.radius", self.radius)
+        finite("VortexForce.spin", self.spin)
+        _limited("vortex", abs(self.spin) * self.radius)
+
+    def over(self, start: float, end: float) -> Blob:
+        """Spin times radius times the envelope's integral."""
+        turn = self.spin * self.radius * self.envelope.integral(start, end)
+        return Blob(place_at(self.center, (start + end) / 2), self.radius, turn=turn)
+
+
+@dataclass(frozen=True)
+class Growth(BlobForce):
+    """Grow (rate > 0) or shrink: a prescribed divergence rate (1 - r^2 / 2) exp(-r^2 / 2) times the envelope.
+
+    r is the distance from the center in radii. The ring beyond r = sqrt(2) gives way for what the middle
+    takes, their integrals cancel, and the velocity that belongs to it in free space is
+    rate / 2 (x - center) exp(-r^2 / 2): the center stays, and areas there grow by exp of the integral of
+    rate times envelope. Where walls cut the ring the mean over the picture is taken off. Areas are not
+    preserved. A step prescribes the mean over its length, so that the integral is exact whatever the step.
+
+    Raises:
+        ValueError: as `GaussianForce`; a rate beyond 100/s.
+    """
+
+    center: Center
+    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    rate: float
+    """Divergence at the center [1/s]; for `Instantaneous` the logarithm of the area's growth."""
+    radius: float
+    """Sigma of the Gaussian [longer side]."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", as_center("Growth.center", self.center))
+        _positive("Growth.radius", self.radius)
+        if not abs(self.rate) <= RATE_LIMIT:
+            raise ValueError(f"growth of {self.rate:g}/s: the limit is {RATE_LIMIT:g}/s")
+
+    def over(self, start: float, end: float) -> Blob:
+        """The rate's mean over the step."""
+        mean = self.rate * self.envelope.integral(start, end) / (end - start) if end > start else 0.0
+        return Blob(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
+
+
+@dataclass(frozen=True)
+class Stroke(BlobForce):
+    """A drag along a polyline: a Gaussian that moves along a path and pushes the way it goes.
+
+    Its acceleration |V| V strength / (radius sqrt(2 pi)), V the path's velocity, gives a free particle
+    on the path the velocity `strength` V by the time it has passed.
+
+    Raises:
+        ValueError: as `GaussianForce`.
+    """
+
+    path: Path
+    """Where the brush is."""
+    radius: float
+    """Sigma of the Gaussian [longer side]."""
+    strength: float = 1.0
+    """Part of the brush's velocity that a free particle on its path takes on."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time, beside the path's own."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.path, Path):
+            raise TypeError(f"Stroke.path: expected a Path, got {type(self.path).__name__}")
+        _positive("Stroke.radius", self.radius)
+        finite("Stroke.strength", self.strength)
+        _limited("stroke", max(math.hypot(*push) for _, _, push in self._pieces()))
+
+    def _pieces(self) -> Iterator[tuple[float, float, Place]]:
+        """From when to when it pushes how [longer side/s^2]."""
+        knots = zip(self.path.times, self.path.places, strict=True)
+        for (t0, (x0, y0)), (t1, (x1, y1)) in itertools.pairwise(knots):
+            vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
+            factor = self.strength * math.hypot(vx, vy) / (self.radius * math.sqrt(2 * math.pi))
+            yield t0, t1, (vx * factor, vy * factor)
+
+    def over(self, start: float, end: float) -> Blob:
+        """The pieces of the path within the step, each in its direction."""
+        px, py = 0.0, 0.0
+        for t0, t1, (ax, ay) in self._pieces():
+            if t0 < end and t1 > start:
+                impulse = self.envelope.integral(max(t0, start), min(t1, end))
+                px, py = px + ax * impulse, py + ay * impulse
+        begin, stop = max(start, self.path.times[0]), min(end, self.path.times[-1])
+        return Blob(self.path.at((begin + stop) / 2), self.radius, push=(px, py))
+
+
+@dataclass(frozen=True)
+class Wind(FieldForce):
+    """One acceleration everywhere.
+
+    Between closed walls the pressure balances it wholly and nothing moves; along a periodic axis it
+    blows, and a `weight` lets it blow anywhere.
+
+    Raises:
+        ValueError: as `GaussianForce`.
+    """
+
+    vector: tuple[float, float]
+    """Acceleration [longer side/s^2]; for `Instantaneous` the velocity gained."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vector", place("Wind.vector", self.vector))
+        _limited("wind", self.reach)
 
     @property
     def reach(self) -> float:
-        """Largest acceleration [longer side/s^2], at the center."""
+        """Its acceleration [longer side/s^2]."""
         return math.hypot(*self.vector)
 
+    def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The vector on all faces within the walls."""
+        force = [np.full((grid.ny, grid.nx), value) for value in self.vector]
+        return [on_faces(force, self.weight, grid, walls)]
 
-def _finite(name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{name} is {value}: expected a finite number")
+
+@dataclass(frozen=True)
+class Buoyancy(Force):
+    """A density's push on the fluid: the density times a vector times the envelope; smoke rises.
+
+    Raises:
+        ValueError: as `GaussianForce`.
+    """
+
+    density: str
+    """Name of the `Density` that is read."""
+    vector: tuple[float, float] = (0.0, -1.0)
+    """Acceleration where the density is 1 [longer side/s^2]; y points down."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vector", place("Buoyancy.vector", self.vector))
+        _limited("buoyancy", math.hypot(*self.vector))
+
+
+@dataclass(frozen=True)
+class Group:
+    """Forces with a name, an envelope and a strength in common: edited as one.
+
+    Raises:
+        TypeError: a member that is neither a force nor a group.
+    """
+
+    members: Sequence[Force | Group]
+    """The forces; a group may hold groups."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time that all are multiplied by."""
+    strength: float = 1.0
+    """Factor that all are multiplied by."""
+    name: str = ""
+    """What it is called."""
+    forces: tuple[Force, ...] = field(init=False, repr=False)
+    """The forces, each under the common envelope and strength."""
+
+    def __post_init__(self) -> None:
+        finite("Group.strength", self.strength)
+        common = product(self.strength, self.envelope)
+        object.__setattr__(self, "forces", tuple(force.under(common) for force in flat(self.members)))
+
+
+def flat(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
+    """The forces themselves, those of groups in their place.
+
+    Raises:
+        TypeError: something that is neither a force nor a group.
+    """
+    found: list[Force] = []
+    for force in forces:
+        if not isinstance(force, Force | Group):
+            raise TypeError(f"expected a force or a Group of forces, got {type(force).__name__}")
+        found += force.forces if isinstance(force, Group) else (force,)
+    return tuple(found)
+
+
+def on_faces(
+    force: Sequence[np.ndarray], weight: Painted | None, grid: Grid, walls: Walls
+) -> tuple[np.ndarray, np.ndarray]:
+    """A field's components on faces (ny, nx), times the weight's means there, and 0 on closed walls."""
+    at_centres = None if weight is None else weight.on(grid)
+    closed = (slice(None), 0), (0, slice(None))
+    out = []
+    for n, (f, periodic) in enumerate(zip(force, walls.periodic, strict=True)):
+        f = f.copy() if at_centres is None else f * mean_with_before(at_centres, 1 - n, periodic)
+        if not periodic:
+            f[closed[n]] = 0.0
+        out.append(f)
+    return out[0], out[1]
+
+
+def mean_with_before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
+    """The mean of each value and the one before it along an axis: from centres to faces."""
+    return (values + before(values, axis, wraps)) / 2
+
+
+def before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
+    """The value before each along an axis; before the first its own, or the last where the axis wraps."""
+    if wraps:
+        return np.roll(values, 1, axis)
+    first = values.take([0], axis)
+    return np.concatenate([first, np.delete(values, -1, axis)], axis)
+
+
+def _limited(what: str, acceleration: float) -> None:
+    if not acceleration <= FORCE_LIMIT:
+        raise ValueError(f"{what} of {acceleration:g}: the limit is {FORCE_LIMIT:g} longer sides/s^2")
+
+
+def _positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{name} {value}: expected a positive number")

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wfluid.forces import FORCE_LIMIT, Constant, Envelope
+from wfluid.envelopes import Constant, Envelope
+from wfluid.forces import FORCE_LIMIT, FieldForce, before, mean_with_before, on_faces
 from wfluid.grid import Grid
 from wfluid.painted import Painted
 from wfluid.picture import Picture, as_stored, resample
+from wfluid.walls import Walls
 
 KINDS = ("gradient", "contour", "vectors")
 
@@ -23,7 +25,7 @@ _FLAT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class ImageForce:
+class ImageForce(FieldForce):
     """A force field from a picture, times an envelope (Bonilla & Velho, section III).
 
     "gradient" pushes towards brighter places, "contour" along lines of equal intensity with the brighter
@@ -73,27 +75,20 @@ class ImageForce:
         longest = np.linalg.norm(self._values, axis=2).max() if self.kind == "vectors" else 1.0
         return abs(self.strength) * float(longest)
 
-    def on_faces(self, grid: Grid, periodic: tuple[bool, bool]) -> tuple[np.ndarray, np.ndarray]:
-        """Acceleration [longer side/s^2] along x and y on the first nx x-faces and ny y-faces, (ny, nx)."""
+    def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The force on the faces, as strong as said."""
         if self.kind == "vectors":
             centres = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
-            force = [_mean_with_before(centres[..., n], 1 - n, periodic[n]) for n in (0, 1)]
+            force = [mean_with_before(centres[..., n], 1 - n, walls.periodic[n]) for n in (0, 1)]
         else:
             values = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
-            values = _blurred(values, grid, self.radius, periodic)
+            values = _blurred(values, grid, self.radius, walls.periodic)
             if np.ptp(values) < _FLAT:
                 raise ValueError("ImageForce: blurred to the grid's cells the picture has no slopes left")
-            force = _slopes(values, grid, self.kind, periodic)
+            force = _slopes(values, grid, self.kind, walls.periodic)
             steepest = float(np.hypot(*force).max())
             force = [f / steepest for f in force]
-        if self.weight is not None:
-            weight = self.weight.on(grid)
-            force = [f * _mean_with_before(weight, 1 - n, periodic[n]) for n, f in enumerate(force)]
-        if not periodic[0]:
-            force[0][:, 0] = 0.0
-        if not periodic[1]:
-            force[1][0, :] = 0.0
-        return self.strength * force[0], self.strength * force[1]
+        return [on_faces([self.strength * f for f in force], self.weight, grid, walls)]
 
 
 def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
@@ -127,7 +122,7 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
 def _slopes(values: np.ndarray, grid: Grid, kind: str, periodic: tuple[bool, bool]) -> list[np.ndarray]:
     """The gradient on faces, or turned a quarter: (d/dy, -d/dx) of the means at nodes."""
     if kind == "gradient":
-        before_x, before_y = (_before(values, axis, periodic[1 - axis]) for axis in (1, 0))
+        before_x, before_y = (before(values, axis, periodic[1 - axis]) for axis in (1, 0))
         return [(values - before_x) / grid.hx, (values - before_y) / grid.hy]
     padded = values
     for axis, wraps in ((0, periodic[1]), (1, periodic[0])):
@@ -135,18 +130,6 @@ def _slopes(values: np.ndarray, grid: Grid, kind: str, periodic: tuple[bool, boo
         padded = np.pad(padded, width, mode="wrap" if wraps else "edge")
     nodes = (padded[1:, 1:] + padded[1:, :-1] + padded[:-1, 1:] + padded[:-1, :-1]) / 4
     return [np.diff(nodes, axis=0)[:, :-1] / grid.hy, -np.diff(nodes, axis=1)[:-1] / grid.hx]
-
-
-def _before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
-    """The value before each along an axis; before the first its own, or the last where the axis wraps."""
-    if wraps:
-        return np.roll(values, 1, axis)
-    first = values.take([0], axis)
-    return np.concatenate([first, np.delete(values, -1, axis)], axis)
-
-
-def _mean_with_before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
-    return (values + _before(values, axis, wraps)) / 2
 
 
 def _blurred(values: np.ndarray, grid: Grid, radius: float, periodic: tuple[bool, bool]) -> np.ndarray:

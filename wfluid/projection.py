@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import warp as wp
 
 from wfluid.equations import FIVE_POINT_INTERVAL, FivePoint, Resisted
@@ -56,11 +58,18 @@ class Projection:
         """Follow the medium: launches only."""
         self.system.invert_coarsest()
 
-    def project(self, velocity: Vector, out: Vector) -> None:
-        """Out = the velocity (with ghosts) without its divergence; out comes without ghosts."""
+    def project(
+        self, velocity: Vector, out: Vector, prescribe: Callable[[wp.array], None] | None = None
+    ) -> None:
+        """Out = the velocity (with ghosts) without its divergence; out comes without ghosts.
+
+        `prescribe` adds a divergence that is to stay to the field it is called with.
+        """
         beta, pitch = self.medium.levels[0].beta if self.medium else (), self.layout.pitch
         inputs = [*velocity, *self._inverse_h, pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
+        if prescribe:
+            prescribe(*self._minus_div)
         self.system.solve(self.how, self._minus_div, self._q)
         subtract = projection.subtract_gradient_beta if beta else projection.subtract_gradient
         inputs = [*velocity, *self._q, *beta, *self._inverse_h, pitch]
@@ -73,6 +82,6 @@ class Projection:
         self.system.levels[0].fill((out,))
 
     def measure(self) -> tuple[Residual, float]:
-        """What the last projection left of the divergence: the residual, and its largest value [1/s]."""
+        """What the last projection left of the divergence not prescribed: residual, largest value [1/s]."""
         residual = self.system.measure(self.how, self._minus_div, self._q)
         return residual, largest(self.system.left[0], self.layout)

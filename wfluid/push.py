@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from wfluid.forces import Constant, Envelope, GaussianForce, Instantaneous, Oscillator
+from wfluid.envelopes import Constant, Envelope, Instantaneous, Oscillator
+from wfluid.forces import GaussianForce
 from wfluid.painted import Painted
 
 KEYS = ("radius", "period", "phase", "start", "end", "at", "strength")

@@ -3,7 +3,9 @@
     v1 = v0 + dt f                           forces
     v2(x) = v1(foot of x)                    advection
     v3 - dt div (2 mu S) + dt alpha v3 = v2  diffusion and drag, implicit Euler, S the strain of v3
-    v4 = v3 - beta grad q,  div beta grad q = div v3,  beta = 1 / (1 + dt alpha)      projection
+    v4 = v3 - beta grad q,  div beta grad q = div v3 - s,  beta = 1 / (1 + dt alpha)  projection
+
+s is the divergence that sources prescribe, as a rule 0.
 
 The foot is traced through v0, which is free of divergence, and carries the map along: v1 is not, and
 would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1; the two differ by
@@ -13,17 +15,19 @@ O(dt^2) a step.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 import warp as wp
 
-from wfluid.controls import STEP_LIMIT, Controls, Force
+from wfluid.controls import STEP_LIMIT, Controls
+from wfluid.density_transport import DensityTransport
 from wfluid.device import Replay, exclusive, free_cores, helpers, load_kernels
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
+from wfluid.forces import Force, Group, flat
 from wfluid.grid import Grid
 from wfluid.kernels import advection, projection, transport
 from wfluid.kernels.cells import Layout
@@ -56,7 +60,11 @@ class SolveReport:
     diffusion: Residual
     """Of the diffusion, relative to the change it made; of u alone where the components are apart."""
     divergence: float
-    """Largest |div v| left [1/s]."""
+    """Largest |div v| left, beside what is prescribed [1/s]."""
+    prescribed: float = 0.0
+    """Sum of the largest divergences that sources prescribed [1/s]."""
+    removed: float = 0.0
+    """The mean of what they prescribed, taken off everywhere: it has no place between walls [1/s]."""
 
 
 class Solver:
@@ -86,20 +94,39 @@ class Solver:
             else SeparateDiffusion(grid, fluid, device)
         )
         self._projection = Projection(grid, fluid, self._medium if fluid.freeze else None, device)
+        self._densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
         self._foot_x, self._foot_y = vector(self.layout, device, 2)
         self._pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
         self._last_dt = 0.0
         self._preparation: Replay | None = None
         self._controls: dict[tuple, Controls] = {}
+        self._last_controls: Controls | None = None
         self._replays: dict[tuple, tuple[Replay, State, State, Controls]] = {}
         work = grid.nx * grid.ny * (COUPLED_WORK if self._medium else 1)
         shared = not device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
         self._pool = helpers(STRIPS if shared else 1)
 
     @exclusive
-    def rest(self) -> State:
-        """A new state: a still fluid under an untouched picture."""
-        return State.at_rest(self.grid, self.device)
+    def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
+        """A new state: a still fluid under an untouched picture, with its densities as they begin.
+
+        `points` (n, 2) are places x, y of the picture [longer side] that are followed.
+
+        Raises:
+            ValueError: points that are not (n, 2) finite numbers within the picture.
+        """
+        points, extent = np.asarray(points, dtype=np.float64), (self.grid.width, self.grid.height)
+        if points.size and (
+            points.ndim != 2 or points.shape[1] != 2 or not np.all((points >= 0) & (points <= extent))
+        ):
+            raise ValueError("points: expected x, y within the picture for each")
+        state = State.at_rest(self.grid, self.device, len(self._densities), len(points))
+        for density, rho in zip(self._densities, state.rho, strict=True):
+            density.begin(rho)
+        if points.size:
+            state.p_x.assign(points[:, 0] / self.grid.hx)
+            state.p_y.assign(points[:, 1] / self.grid.hy)
+        return state
 
     @exclusive
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
@@ -114,7 +141,7 @@ class Solver:
         self,
         state_in: State,
         state_out: State,
-        forces: Sequence[Force],
+        forces: Sequence[Force | Group],
         t: float,
         dt: float,
         *,
@@ -134,7 +161,8 @@ class Solver:
         if state_in is state_out:
             raise ValueError("a step cannot write the state it reads")
         self._check(state_in, state_out)
-        self._replay_for(state_in, state_out, forces, t, dt, t + dt if until is None else until).launch()
+        until = t + dt if until is None else until
+        self._replay_for(state_in, state_out, flat(forces), t, dt, until).launch()
 
     @exclusive
     def _replay_for(
@@ -148,8 +176,11 @@ class Solver:
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
         controls = self._controls_for(forces)
-        controls.set(forces, t, dt, until, self._kept(dt))
-        plan = self._plan(until, dt)
+        self._last_controls = controls
+        controls.set(forces, t, dt, until, 0.0 if controls.swells else self._kept(dt))
+        for density in self._densities:
+            density.set(t, until)
+        plan = self._plan(until, dt) + tuple(density.plan(dt) for density in self._densities)
         key = (id(state_in), id(state_out), id(controls), plan)
         if key not in self._replays:
             work = partial(self._advance, state_in, state_out, controls)
@@ -163,7 +194,8 @@ class Solver:
     def _kept(self, dt: float) -> float:
         """The part of the last step's pressure that a step of dt takes off before its diffusion.
 
-        None where viscosity changes or moves: the strain that belonged to it would be elsewhere.
+        None where viscosity changes or moves: the strain that belonged to it would be elsewhere. Nor where
+        divergence is prescribed, whose pressure is of this step alone.
         """
         medium, last, self._last_dt = self._medium, self._last_dt, dt
         if not medium or medium.changes or self.fluid.viscosity_moves or last == 0:
@@ -204,7 +236,10 @@ class Solver:
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
         pressure, divergence = self._projection.measure()
-        return SolveReport(pressure, self._diffusion.measure(), divergence)
+        prescribed, removed = 0.0, 0.0
+        if self._last_controls:
+            prescribed, removed = self._last_controls.prescribed, self._last_controls.removed
+        return SolveReport(pressure, self._diffusion.measure(), divergence, prescribed, removed)
 
     @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
@@ -239,13 +274,20 @@ class Solver:
         for state in states:
             if state.grid != self.grid or state.u.device != self.device:
                 raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
+            if len(state.rho) != len(self._densities) or len(state.p_x) != len(states[0].p_x):
+                raise ValueError(
+                    f"a state with {len(state.rho)} densities and {len(state.p_x)} points: expected "
+                    f"{len(self._densities)} and {len(states[0].p_x)}"
+                )
 
     def _controls_for(self, forces: Sequence[Force]) -> Controls:
         key = Controls.key(forces)
         if key not in self._controls:
             if len(self._controls) >= REPLAYS_KEPT:
                 del self._controls[next(iter(self._controls))]
-            self._controls[key] = Controls(forces, self.grid, self.fluid.walls, self.device)
+            self._controls[key] = Controls(
+                forces, self.fluid.density_names, self.grid, self.fluid.walls, self.device
+            )
         return self._controls[key]
 
     def _advance(self, state_in: State, state_out: State, controls: Controls) -> None:
@@ -254,11 +296,13 @@ class Solver:
             self._follow_medium(state_in)
         self._trace(state_in, controls)
         self._carry_map(state_in, state_out)
+        self._carry_densities(state_in, state_out)
+        self._carry_points(state_in, state_out, controls)
         velocity = self._push(state_in, controls)
         velocity = self._advect(velocity)
         velocity = self._subtract_pressure(velocity, state_in, controls)
         velocity = self._diffuse(velocity)
-        self._project(velocity, state_out)
+        self._project(velocity, state_out, controls.prescribe if controls.swells else None)
         if self._medium:
             self._projection.add_pressure(state_in.q, controls.kept, state_out.q)
 
@@ -276,7 +320,7 @@ class Solver:
     def _push(self, state: State, controls: Controls) -> Vector:
         if not controls.pushes:
             return state.u, state.v
-        controls.push((state.u, state.v), self._pushed)
+        controls.push(state, self._pushed)
         self._fill(self._pushed)
         return self._pushed
 
@@ -288,6 +332,17 @@ class Solver:
         with together():
             self._d_x_ghosts.fill(state_out.d_x)
             self._d_y_ghosts.fill(state_out.d_y)
+
+    def _carry_densities(self, state_in: State, state_out: State) -> None:
+        foot, place = (self._foot_x, self._foot_y), self._where()
+        for density, rho, out in zip(self._densities, state_in.rho, state_out.rho, strict=True):
+            density.advance(rho, foot, place, out)
+
+    def _carry_points(self, state_in: State, state_out: State, controls: Controls) -> None:
+        state = state_in
+        inputs = [state.p_x, state.p_y, state.u, state.v, controls.dt_hx, controls.dt_hy, *self._where()]
+        out = [state_out.p_x, state_out.p_y]
+        transport.carry_points.launch(len(state.p_x), self.device, inputs, out)
 
     def _advect(self, velocity: Vector) -> Vector:
         paper = self.fluid.scheme == "paper"
@@ -318,9 +373,14 @@ class Solver:
         self._diffusion.diffuse(velocity)
         return self._diffusion.out
 
-    def _project(self, velocity: Vector, state_out: State) -> None:
+    def _project(
+        self,
+        velocity: Vector,
+        state_out: State,
+        prescribe: Callable[[wp.array], None] | None = None,
+    ) -> None:
         out = (state_out.u, state_out.v)
-        self._projection.project(velocity, out)
+        self._projection.project(velocity, out, prescribe)
         self._fill(out)
 
     def _fill(self, velocity: Vector) -> None:

@@ -49,7 +49,7 @@ def from_numpy(values: np.ndarray, f: wp.array, layout: Layout) -> None:
 
 @dataclass(frozen=True)
 class State:
-    """Velocity, displacement and pressure of a fluid, as device arrays over one `Layout`, ghosts filled."""
+    """A fluid over one `Layout`, with ghosts: velocity, displacement, pressure, densities; and points."""
 
     grid: Grid
     """The grid the arrays are on."""
@@ -64,17 +64,21 @@ class State:
     q: wp.array
     """Impulse of the pressure in the last step, at centres [longer side^2/s], the next step's first guess;
     0 where diffusion needs none."""
+    rho: tuple[wp.array, ...]
+    """The fluid's densities at centres, in their order; of no unit."""
+    p_x: wp.array
+    """Where points of the picture are now, along x [cells from the left edge]; one number a point."""
+    p_y: wp.array
+    """The same along y [cells from the top edge]."""
 
     @classmethod
-    def at_rest(cls, grid: Grid, device: wp.Device) -> State:
-        """A still fluid under an untouched picture."""
+    def at_rest(cls, grid: Grid, device: wp.Device, densities: int = 0, points: int = 0) -> State:
+        """A still fluid under an untouched picture, without densities; all points at the origin."""
         layout = Layout(grid.nx, grid.ny)
-        return cls(grid, *(field(layout, device) for _ in range(5)))
-
-    @property
-    def arrays(self) -> tuple[wp.array, ...]:
-        """u, v, d_x, d_y, q."""
-        return self.u, self.v, self.d_x, self.d_y, self.q
+        p_x, p_y = (wp.zeros(points, dtype=Real, device=device) for _ in range(2))
+        return cls(
+            grid, *(field(layout, device) for _ in range(5)), vector(layout, device, densities), p_x, p_y
+        )
 
     @property
     def layout(self) -> Layout:
@@ -91,3 +95,13 @@ class State:
         """Source minus position at centres [longer side]: two (ny, nx) arrays, copies."""
         d_x, d_y = (to_numpy(d, self.layout) for d in (self.d_x, self.d_y))
         return d_x * self.grid.hx, d_y * self.grid.hy
+
+    @property
+    def densities(self) -> tuple[np.ndarray, ...]:
+        """The densities at centres: (ny, nx) arrays, copies."""
+        return tuple(to_numpy(rho, self.layout) for rho in self.rho)
+
+    @property
+    def points(self) -> np.ndarray:
+        """Where the points are now [longer side]: (points, 2), x and y, a copy."""
+        return np.stack([self.p_x.numpy() * self.grid.hx, self.p_y.numpy() * self.grid.hy], axis=1)

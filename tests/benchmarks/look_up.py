@@ -7,8 +7,9 @@ import warp as wp
 from timing import alternate
 
 from wfluid.device import open_device
+from wfluid.envelopes import Instantaneous
 from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce, Instantaneous
+from wfluid.forces import GaussianForce
 from wfluid.grid import Grid
 from wfluid.look_up import LookUp
 from wfluid.picture import Picture

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wfluid.animation import Animation, PoorSolveWarning, Timeline, animate
+from wfluid.envelopes import Arbitrary, Constant, Instantaneous
 from wfluid.fluid import Fluid
-from wfluid.forces import Arbitrary, Constant, GaussianForce, Instantaneous
+from wfluid.forces import GaussianForce
 from wfluid.picture import Picture
 
 PUSH = GaussianForce((0.5, 0.35), (3.0, 1.0), 0.1, Constant(0.0, 0.2))

@@ -6,9 +6,10 @@ from oracles import divergence
 
 from wfluid import Constant, GaussianForce, Grid, ImageForce, Instantaneous, Painted, Picture
 from wfluid.image_force import vectors_of
+from wfluid.walls import Walls
 
 GRID = Grid(24, 18, 1.0, 0.75)
-OPEN, WRAPPED = (False, False), (True, True)
+OPEN, WRAPPED = Walls(), Walls.parse("periodic")
 
 
 def bumps(grid, seed=0):
@@ -26,7 +27,7 @@ def bumps(grid, seed=0):
 def test_a_gradient_points_to_the_brighter_side_with_the_strength_said():
     """A ramp along x: the same force everywhere between the walls, none through them."""
     ramp = np.broadcast_to((np.arange(24) + 0.5) / 24, (18, 24))
-    along, across = ImageForce(ramp, strength=3.0, radius=0).on_faces(GRID, OPEN)
+    along, across = ImageForce(ramp, strength=3.0, radius=0).fields(GRID, OPEN)[0]
     np.testing.assert_allclose(along[:, 1:], 3.0, rtol=1e-5)
     assert np.all(along[:, 0] == 0) and np.abs(across).max() < 1e-6
 
@@ -34,10 +35,10 @@ def test_a_gradient_points_to_the_brighter_side_with_the_strength_said():
 def test_a_contour_has_the_brighter_side_on_its_right_and_no_divergence():
     """Bright below: along +x (y points down). On a periodic grid its divergence is rounding."""
     ramp = np.broadcast_to(((np.arange(18) + 0.5) / 18)[:, None], (18, 24))
-    along, across = ImageForce(ramp, "contour", 2.0, radius=0).on_faces(GRID, OPEN)
+    along, across = ImageForce(ramp, "contour", 2.0, radius=0).fields(GRID, OPEN)[0]
     np.testing.assert_allclose(along[1:-1, 1:], 2.0, rtol=1e-5)
     assert np.abs(across).max() < 1e-6
-    u, v = ImageForce(np.random.default_rng(1).random((18, 24)), "contour", radius=0).on_faces(GRID, WRAPPED)
+    u, v = ImageForce(np.random.default_rng(1).random((18, 24)), "contour", radius=0).fields(GRID, WRAPPED)[0]
     u, v = np.hstack([u, u[:, :1]]), np.vstack([v, v[:1]])
     assert np.abs(divergence(GRID, u, v)).max() < 1e-6 / GRID.hx
     assert np.abs(u).max() > 0.3
@@ -51,7 +52,7 @@ def test_the_blur_takes_fine_grain_and_keeps_what_is_wide():
     from wfluid.image_force import _blurred
 
     for values, n in ((fine, 8), (wide, 1)):
-        got = _blurred(np.broadcast_to(values, (4, 128)), grid, radius, WRAPPED)[0]
+        got = _blurred(np.broadcast_to(values, (4, 128)), grid, radius, WRAPPED.periodic)[0]
         left = np.exp(-0.5 * (2 * np.pi * n * radius) ** 2)
         np.testing.assert_allclose(got - 0.5, left * (values - 0.5), atol=1e-4)
 
@@ -66,7 +67,7 @@ def test_vectors_are_read_with_zero_at_half_range():
     arrow = np.zeros((18, 24, 2))
     arrow[..., 0], arrow[..., 1] = 0.5, -0.25
     force = ImageForce(arrow, "vectors", 4.0)
-    along, across = force.on_faces(GRID, WRAPPED)
+    along, across = force.fields(GRID, WRAPPED)[0]
     np.testing.assert_allclose(along, 2.0)
     np.testing.assert_allclose(across, -1.0)
     assert force.reach == pytest.approx(4 * np.hypot(0.5, 0.25))
@@ -83,10 +84,10 @@ def test_transparent_vectors_are_none_and_alpha_is_no_channel():
 def test_the_strength_is_the_length_where_it_is_steepest():
     """Along a diagonal too; and what is flat but for rounding is refused."""
     x, y = (np.arange(24) + 0.5) / 24, ((np.arange(18) + 0.5) / 24)[:, None]
-    force = ImageForce((x + y) / 2, strength=3.0, radius=0).on_faces(GRID, OPEN)
+    force = ImageForce((x + y) / 2, strength=3.0, radius=0).fields(GRID, OPEN)[0]
     np.testing.assert_allclose(np.hypot(*force)[1:, 1:], 3.0, rtol=1e-4)
     with pytest.raises(ValueError, match="no slopes left"):
-        ImageForce(0.3 + 1e-9 * np.arange(24) * np.ones((18, 1))).on_faces(GRID, OPEN)
+        ImageForce(0.3 + 1e-9 * np.arange(24) * np.ones((18, 1))).fields(GRID, OPEN)[0]
 
 
 def velocity_after(make_solver, forces, steps=4, dt=0.05, **fluid):
@@ -111,7 +112,7 @@ def test_impulses_are_those_of_the_envelope(make_solver):
     """A contour is untouched by pressure: after one step at rest the velocity is force times impulse."""
     for envelope, impulse in ((Constant(0.0, 0.02), 0.02), (Instantaneous(0.01), 1.0), (Constant(), 0.05)):
         force = ImageForce(bumps(GRID), "contour", 0.3, envelope)
-        expected = force.on_faces(GRID, WRAPPED)[0]
+        expected = force.fields(GRID, WRAPPED)[0][0]
         u, _ = velocity_after(make_solver, [force], steps=1, walls="periodic")
         np.testing.assert_allclose(u[:, :-1], impulse * expected, atol=2e-5 * impulse)
 
@@ -137,7 +138,7 @@ def test_a_weight_scales_a_force_where_it_is_painted(make_solver):
     solver = make_solver(GRID.nx, GRID.ny, grid=GRID)
     rest, state = solver.rest(), solver.rest()
     solver._controls_for([left]).set([left], 0.0, 0.1, 0.1)
-    solver._controls_for([left]).push((rest.u, rest.v), (state.u, state.v))
+    solver._controls_for([left]).push(rest, (state.u, state.v))
     v = state.velocity[1]
     assert np.abs(v[:, 12:]).max() == 0 and np.abs(v[:, :12]).max() > 0.01
 
@@ -163,5 +164,5 @@ def test_what_is_no_force_is_refused(make, message):
 
 def test_a_painted_force_beyond_the_limit_is_refused_with_the_number(make_solver):
     force = ImageForce(np.full((2, 2, 2), 100.0), "vectors", 9e3)
-    with pytest.raises(ValueError, match=r"a painted force would add a velocity of 1\.27279e\+06"):
+    with pytest.raises(ValueError, match=r"a force over the picture would add a velocity of 1\.27279e\+06"):
         velocity_after(make_solver, [force], steps=1, dt=1.0)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from oracles import divergence, from_streamfunction, laplacian_2d, noise_velocity
 
 from wfluid.device import open_device
+from wfluid.envelopes import Constant, Instantaneous
 from wfluid.fluid import Fluid
-from wfluid.forces import Constant, GaussianForce, Instantaneous
+from wfluid.forces import GaussianForce
 from wfluid.grid import Grid
 from wfluid.solver import Solver
 
