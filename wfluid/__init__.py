@@ -16,7 +16,6 @@ from typing import Any
 _HOME = {
     "Animation": "animation",
     "Frame": "animation",
-    "Timeline": "animation",
     "animate": "animation",
     "CoordinateMap": "coordinate_map",
     "MapQuality": "coordinate_map",
@@ -40,6 +39,7 @@ _HOME = {
     "Grid": "grid",
     "ImageForce": "image_force",
     "LookUp": "look_up",
+    "Seam": "loops",
     "NoiseForce": "noise_force",
     "write_animation": "output",
     "Freeze": "painted",
@@ -55,6 +55,7 @@ _HOME = {
     "SolveReport": "solver",
     "Solver": "solver",
     "State": "state",
+    "Timeline": "timeline",
     "Wall": "walls",
     "Walls": "walls",
 }

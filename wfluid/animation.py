@@ -2,93 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import time
-import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from wfluid.controls import STEP_LIMIT
+import numpy as np
+
+from wfluid.composite import show_densities
 from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
 from wfluid.device import open_device
 from wfluid.fluid import Fluid
-from wfluid.forces import Force, Group
+from wfluid.forces import Force, Group, flat
 from wfluid.grid import LEAST_CELLS, Grid
-from wfluid.linear import ITERATION_LIMIT
 from wfluid.look_up import LookUp, check_look_up
+from wfluid.loops import Seam, check_loop, frames_of, looped, looping
 from wfluid.picture import Picture
+from wfluid.runner import Moment, Runner
 from wfluid.solver import Solver, SolveReport
-
-STEPS_PER_SECOND = 96
-"""Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
-
-LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
-"""Frame rates that make sense."""
-
-FRAME_LIMIT = 100_000
-"""Most frames of one animation."""
+from wfluid.timeline import Timeline
 
 CELLS_LIMIT = 8192
 """Most cells along the longer side: indices are 32-bit."""
 
 SIZE_LIMIT = 32768
 """Longest side of a frame [px]."""
-
-POOR_RESIDUAL = 0.02
-"""Relative residual of the projection above which a frame warns."""
-
-
-class PoorSolveWarning(UserWarning):
-    """A solve left more than it should; the message has the number and the remedy."""
-
-
-@dataclass(frozen=True)
-class Timeline:
-    """Frames at n / fps for n = 0 … round(duration fps), each `substeps` steps after the one before."""
-
-    duration: float
-    """Length [s], positive."""
-    fps: float = 24.0
-    """Frames a second."""
-    substeps: int | None = None
-    """Steps a frame; by default so many that a step is no longer than 1/96 s."""
-
-    def __post_init__(self) -> None:
-        for name in ("duration", "fps"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} {value}: expected a positive number")
-        if self.substeps is not None and not (isinstance(self.substeps, int) and self.substeps >= 1):
-            raise ValueError(f"substeps {self.substeps}: expected a whole number from 1 on")
-        if not 0.5 <= self.duration * self.fps <= FRAME_LIMIT:
-            raise ValueError(
-                f"{self.duration:g} s at {self.fps:g} fps is {self.duration * self.fps:g} frames: "
-                f"expected 1 … {FRAME_LIMIT}"
-            )
-        if not LEAST_FPS <= self.fps <= FPS_LIMIT:
-            raise ValueError(f"fps {self.fps:g}: expected {LEAST_FPS:g} … {FPS_LIMIT:g}")
-        if self.dt > STEP_LIMIT:
-            raise ValueError(f"steps of {self.dt:g} s: expected at most {STEP_LIMIT:g}; use more substeps")
-
-    @property
-    def frames(self) -> int:
-        """Frames shown, both ends included."""
-        return max(1, round(self.duration * self.fps)) + 1
-
-    @property
-    def steps_per_frame(self) -> int:
-        """Steps between two frames."""
-        return self.substeps or math.ceil(STEPS_PER_SECOND / self.fps)
-
-    @property
-    def dt(self) -> float:
-        """Length of a step [s]."""
-        return self.time_of(1)
-
-    def time_of(self, step: int) -> float:
-        """When a step begins [s]: the same number as the end of the one before."""
-        return step / (self.fps * self.steps_per_frame)
 
 
 @dataclass(frozen=True)
@@ -100,13 +38,19 @@ class Frame:
     time: float
     """Its time [s]."""
     picture: Picture
-    """The warped picture; that of frame 0 is the untouched one."""
+    """The warped picture, densities over it; that of frame 0 is the untouched one."""
     map: CoordinateMap
     """Where its colours come from."""
     quality: MapQuality
     """What the map does to the picture."""
     solve: SolveReport | None
     """What the last step's solves left; None for frame 0."""
+    layers: dict[str, Picture] = field(default_factory=dict)
+    """The layers, warped as the picture is, by name."""
+    densities: dict[str, np.ndarray] = field(default_factory=dict)
+    """The densities at the grid's centres, (ny, nx), by name."""
+    points: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    """Where the points that are followed are now [longer side], (n, 2), x and y."""
 
 
 @dataclass
@@ -148,6 +92,14 @@ class Animation:
     """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
     device: str | None = None
     """"cpu" (default), "cuda", "cuda:1", …"""
+    layers: Mapping[str, Picture] = field(default_factory=dict)
+    """Further pictures and mattes that go through the same map, stretched over the picture, by name."""
+    points: Sequence[tuple[float, float]] = ()
+    """Places x, y of the picture [longer side] that are followed."""
+    loop: str | None = None
+    """"oscillate", "pingpong" or "crossfade": the frames follow one another without end."""
+    seam: Seam = field(default_factory=Seam, compare=False)
+    """How well the loop's end meets its beginning, filled in when all frames are made."""
     seconds: Seconds = field(default_factory=Seconds, compare=False)
     """Where the time went, filled in while frames are made."""
 
@@ -159,6 +111,20 @@ class Animation:
         check_look_up(self.filter, self.edge)
         if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
             raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
+        forces = flat(self.forces)
+        if self.loop is not None:
+            check_loop(self.loop, forces)
+            forces = tuple(looped(force, self._loop_frames / self.timeline.fps) for force in forces)
+        object.__setattr__(self, "_acting", forces)
+
+    @property
+    def _loop_frames(self) -> int:
+        return frames_of(self.loop, self.timeline.frames - 1)
+
+    @property
+    def frame_count(self) -> int:
+        """Frames shown: both ends included, but for the last of a loop, which is the first."""
+        return self.timeline.frames if self.loop is None else self._loop_frames
 
     @property
     def grid(self) -> Grid:
@@ -172,42 +138,60 @@ class Animation:
         self.seconds.compile = solver.compile_seconds
         return solver
 
-    def _source(self) -> Picture:
-        """What is looked up in: shrunk first when the frames are smaller, so that they do not alias."""
-        width, height = self.width or self.picture.width, self.height or self.picture.height
-        return self.picture.resized(min(width, self.picture.width), min(height, self.picture.height))
+    def _moments(self) -> Iterator[Moment]:
+        """The fluid at every frame."""
+        runner = Runner(self.solver, self.timeline, self.points)
+        if self.loop is None:
+            return runner.moments(self._acting, self.timeline.frames - 1)
+        return looping(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
 
-    def frames(self) -> Iterator[Frame]:
-        """Run the animation from rest, one frame at a time."""
-        solver, timeline, clock = self.solver, self.timeline, time.perf_counter
-        look_up = LookUp(
-            self._source(),
+    def _look_up(self, picture: Picture) -> LookUp:
+        """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
+        width, height = self.width or self.picture.width, self.height or self.picture.height
+        return LookUp(
+            picture.resized(min(width, picture.width), min(height, picture.height)),
             self.grid,
             self.fluid.walls,
-            solver.device,
-            width=self.width or self.picture.width,
-            height=self.height or self.picture.height,
+            self.solver.device,
+            width=width,
+            height=height,
             filter=self.filter,
             edge=self.edge,
         )
-        now, after = solver.rest(), solver.rest()
-        solve, warned = None, False
-        for index in range(timeline.frames):
+
+    def frames(self) -> Iterator[Frame]:
+        """Run the animation from rest, one frame at a time."""
+        clock, walls = time.perf_counter, self.fluid.walls
+        shown = self._look_up(self.picture)
+        layers = {name: self._look_up(layer) for name, layer in self.layers.items()}
+        moments = self._moments()
+        for index in range(self.frame_count):
             began = clock()
-            if index:
-                for step in range((index - 1) * timeline.steps_per_frame, index * timeline.steps_per_frame):
-                    start, end = timeline.time_of(step), timeline.time_of(step + 1)
-                    solver.step(now, after, self.forces, start, timeline.dt, until=end)
-                    now, after = after, now
-                solve = solver.report()
-                warned = _judge(solve, self.fluid, index, warned)
-            quality = measure_map(now, self.fluid.walls)
-            warp = CoordinateMap.of_state(now, self.fluid.walls)
+            moment = next(moments)
+            state = moment.state
+            quality, warp = measure_map(state, walls), CoordinateMap.of_state(state, walls)
             simulated = clock()
-            picture = look_up.render(now.d_x, now.d_y) if index else look_up.untouched
+            still = quality.displacement_max == 0
+            picture, *others = (
+                look_up.untouched if still else look_up.render(state.d_x, state.d_y)
+                for look_up in (shown, *layers.values())
+            )
+            densities = state.densities
+            picture = show_densities(picture, self.fluid.densities, densities)
             self.seconds.simulate += simulated - began
             self.seconds.lookup += clock() - simulated
-            yield Frame(index, index / timeline.fps, picture, warp, quality, solve)
+            yield Frame(
+                index,
+                index / self.timeline.fps,
+                picture,
+                warp,
+                quality,
+                moment.solve,
+                dict(zip(layers, others, strict=True)),
+                dict(zip(self.fluid.density_names, densities, strict=True)),
+                state.points,
+            )
+        next(moments, None)  # what a loop measures when it is through
 
 
 def animate(
@@ -221,48 +205,10 @@ def animate(
 ) -> Iterator[Frame]:
     """Frames of `picture` moved by `forces` for `duration` seconds, made as they are asked for.
 
-    `settings` are those of `Animation`: cells, width, height, filter, edge, device.
+    `settings` are those of `Animation`: cells, width, height, filter, edge, device, layers, points, loop.
 
     Raises:
         ValueError: a value outside its range; the message names it and the range.
     """
     timeline = Timeline(duration, fps, substeps)
     return Animation(picture, fluid, tuple(forces), timeline, **settings).frames()
-
-
-def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
-    """Stop where the fluid is no longer finite; warn once of a projection that left too much.
-
-    The paper's own scheme is not warned of: few Jacobi sweeps are part of it.
-    """
-    pressure = solve.pressure
-    if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
-        raise FloatingPointError(
-            f"frame {index}: the velocity is no longer finite; use smaller forces or steps"
-        )
-    if warned or fluid.scheme == "paper":
-        return warned
-    text = _poor(solve, fluid)
-    if text:
-        warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
-    return bool(text)
-
-
-def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
-    """What a step's solves left too much of, with the remedy; None if nothing."""
-    pressure, diffusion = solve.pressure, solve.diffusion
-    if pressure.relative > POOR_RESIDUAL:
-        left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"
-        if pressure.method == "multigrid":
-            more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
-            return f"{left} cycles; {more}"
-        if pressure.method == "jacobi":
-            return f"{left} sweeps; set solver (--solver) to multigrid"
-        return f"{left} iterations; soften the edges of the freeze mask"
-    if diffusion.method == "conjugate gradients" and diffusion.iterations == ITERATION_LIMIT:
-        return (
-            f"the diffusion left {diffusion.relative:.1e} of its change after "
-            f"{diffusion.iterations} iterations; "
-            "lower the contrast of the viscosity, soften its edges, or use more substeps"
-        )
-    return None

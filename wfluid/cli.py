@@ -182,7 +182,7 @@ def run_warmup(options: argparse.Namespace) -> int:
 
 def run_animate(options: argparse.Namespace) -> int:
     """Read the picture, run the animation, write frames and report."""
-    from wfluid.animation import Animation, Timeline
+    from wfluid.animation import Animation
     from wfluid.estimate import check_memory
     from wfluid.fluid import Fluid
     from wfluid.output import check_folder, names, open_output
@@ -190,6 +190,7 @@ def run_animate(options: argparse.Namespace) -> int:
     from wfluid.picture import Encoding, read_picture
     from wfluid.push import Push
     from wfluid.report import Report, write_report
+    from wfluid.timeline import Timeline
 
     began = time.perf_counter()
     settings = {

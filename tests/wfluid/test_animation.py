@@ -8,11 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wfluid.animation import Animation, PoorSolveWarning, Timeline, animate
+from wfluid.animation import Animation, animate
 from wfluid.envelopes import Arbitrary, Constant, Instantaneous
 from wfluid.fluid import Fluid
 from wfluid.forces import GaussianForce
 from wfluid.picture import Picture
+from wfluid.runner import PoorSolveWarning
+from wfluid.timeline import Timeline
 
 PUSH = GaussianForce((0.5, 0.35), (3.0, 1.0), 0.1, Constant(0.0, 0.2))
 

@@ -1,0 +1,65 @@
+"""When frames are shown, and how many steps lie between."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from wfluid.controls import STEP_LIMIT
+
+STEPS_PER_SECOND = 96
+"""Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
+
+LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
+"""Frame rates that make sense."""
+
+FRAME_LIMIT = 100_000
+"""Most frames of one animation."""
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Frames at n / fps for n = 0 … round(duration fps), each `substeps` steps after the one before."""
+
+    duration: float
+    """Length [s], positive."""
+    fps: float = 24.0
+    """Frames a second."""
+    substeps: int | None = None
+    """Steps a frame; by default so many that a step is no longer than 1/96 s."""
+
+    def __post_init__(self) -> None:
+        for name in ("duration", "fps"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} {value}: expected a positive number")
+        if self.substeps is not None and not (isinstance(self.substeps, int) and self.substeps >= 1):
+            raise ValueError(f"substeps {self.substeps}: expected a whole number from 1 on")
+        if not 0.5 <= self.duration * self.fps <= FRAME_LIMIT:
+            raise ValueError(
+                f"{self.duration:g} s at {self.fps:g} fps is {self.duration * self.fps:g} frames: "
+                f"expected 1 … {FRAME_LIMIT}"
+            )
+        if not LEAST_FPS <= self.fps <= FPS_LIMIT:
+            raise ValueError(f"fps {self.fps:g}: expected {LEAST_FPS:g} … {FPS_LIMIT:g}")
+        if self.dt > STEP_LIMIT:
+            raise ValueError(f"steps of {self.dt:g} s: expected at most {STEP_LIMIT:g}; use more substeps")
+
+    @property
+    def frames(self) -> int:
+        """Frames shown, both ends included."""
+        return max(1, round(self.duration * self.fps)) + 1
+
+    @property
+    def steps_per_frame(self) -> int:
+        """Steps between two frames."""
+        return self.substeps or math.ceil(STEPS_PER_SECOND / self.fps)
+
+    @property
+    def dt(self) -> float:
+        """Length of a step [s]."""
+        return self.time_of(1)
+
+    def time_of(self, step: int) -> float:
+        """When a step begins [s]: the same number as the end of the one before."""
+        return step / (self.fps * self.steps_per_frame)
