@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wfluid import Animation, Fluid, Push, Timeline, read_picture, write_animation
+from wfluid import Animation, Drawing, Fluid, Timeline, parse_force, read_picture, write_animation
 
 PICTURE = Path(__file__).parent / "images" / "raccoon.jpg"
 
@@ -28,7 +28,8 @@ def animation(periods=2.0, fps=15.0, cells=256, width=480, device=None):
     picture = read_picture(PICTURE)
     duration = periods * PERIOD
     whole = max(duration, PERIOD)  # a shorter run shows the beginning of the same motion
-    forces = [Push.parse(push).force(picture.width, picture.height, whole) for push in (NOSE, MOUTH)]
+    drawing = Drawing(picture.width, picture.height, whole)
+    forces = [drawing.force(parse_force("push", push)) for push in (NOSE, MOUTH)]
     height = round(width * picture.height / picture.width)
     return Animation(
         picture,

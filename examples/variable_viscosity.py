@@ -15,7 +15,17 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from wfluid import Animation, Fluid, Freeze, Painted, Picture, Push, Timeline, read_picture
+from wfluid import (
+    Animation,
+    Drawing,
+    Fluid,
+    Freeze,
+    Painted,
+    Picture,
+    Timeline,
+    parse_force,
+    read_picture,
+)
 from wfluid.output import open_output
 
 IMAGES = Path(__file__).parent / "images"
@@ -42,7 +52,8 @@ def fluids():
 def animations(duration=1.0, fps=12.0, cells=192, width=320, device=None):
     """The same force in each of the fluids."""
     picture = read_picture(IMAGES / "raccoon.jpg")
-    force = Push.parse(PUSH).force(picture.width, picture.height, max(duration, 1.0))
+    drawing = Drawing(picture.width, picture.height, max(duration, 1.0))
+    force = drawing.force(parse_force("push", PUSH))
     timeline = Timeline(duration, fps, round(STEPS_PER_SECOND / fps))
     height = round(width * picture.height / picture.width)
     size = {"cells": cells, "width": width, "height": height, "device": device}

@@ -25,6 +25,12 @@ QUEUED_FRAMES = 6
 PROGRAM = 240e6
 """Bytes that Python and the libraries take before the first array."""
 
+DENSITY_FIELDS = 15
+"""Fields that a density takes, where it diffuses."""
+
+LOOP_FRAMES = {"oscillate": (1.0, 2.0), "pingpong": (0.5, 0.5), "crossfade": (0.25, 1.25)}
+"""By kind of loop: the part of its frames that are kept, and that are run."""
+
 _REAL = 4
 
 
@@ -38,10 +44,10 @@ class Estimate:
     """Time without compiling and writing."""
 
 
-def estimate(animation: Animation, frames_kept: bool = False) -> Estimate:
+def estimate(animation: Animation, frames_kept: int = 0) -> Estimate:
     """Memory and time of an animation, from its sizes alone.
 
-    `frames_kept` for outputs that hold every frame until the last: a GIF's palette needs them all.
+    `frames_kept` is how many outputs hold every frame until the last: a GIF's palette needs them all.
     """
     grid, picture = animation.grid, animation.picture
     width, height = animation.width or picture.width, animation.height or picture.height
@@ -52,14 +58,20 @@ def estimate(animation: Animation, frames_kept: bool = False) -> Estimate:
         + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
         + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
     )
-    memory += PROGRAM + frames_kept * 3 * animation.timeline.frames * width * height
-    steps = (animation.timeline.frames - 1) * animation.timeline.steps_per_frame
+    frames, shown = animation.frame_count, 1 + len(animation.layers)
+    memory += (shown - 1) * _REAL * (channels + FIELDS_PER_PIXEL + channels * QUEUED_FRAMES) * width * height
+    densities = len(animation.fluid.densities)
+    memory += _REAL * grid.nx * grid.ny * (DENSITY_FIELDS * densities)
+    kept, run = LOOP_FRAMES.get(animation.loop, (0.0, 1.0))
+    memory += _REAL * grid.nx * grid.ny * (2 + densities) * kept * frames
+    memory += PROGRAM + frames_kept * 3 * frames * width * height
+    steps = round(run * (frames - (animation.loop is None)) * animation.timeline.steps_per_frame)
     seconds = steps * grid.nx * grid.ny * (SECONDS_PER_CELL_STEP if apart else COUPLED_SECONDS)
-    seconds += animation.timeline.frames * width * height * SECONDS_PER_PIXEL
+    seconds += shown * frames * width * height * SECONDS_PER_PIXEL
     return Estimate(memory, seconds)
 
 
-def check_memory(animation: Animation, frames_kept: bool = False) -> None:
+def check_memory(animation: Animation, frames_kept: int = 0) -> None:
     """Refuse an animation that will not fit.
 
     Raises:
@@ -68,7 +80,7 @@ def check_memory(animation: Animation, frames_kept: bool = False) -> None:
     need, there = estimate(animation, frames_kept).memory, free_memory()
     if need > there:
         raise ValueError(
-            f"{animation.grid.nx} x {animation.grid.ny} cells and {animation.timeline.frames} frames "
+            f"{animation.grid.nx} x {animation.grid.ny} cells and {animation.frame_count} frames "
             f"{animation.width or animation.picture.width} pixels wide need about {readable_size(need)} of "
             f"memory, {readable_size(there)} are free; lower --cells or --width"
             + (", or write a movie or a sequence instead of a GIF" if frames_kept else "")

@@ -132,7 +132,7 @@ class LookUp:
             return self.render(still, still)
         if alpha != self._source.alpha:
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
-        return Picture(np.array(pixels), self._source.alpha, self.picture.dtype, self.picture.metadata)
+        return replace(self.picture, pixels=np.array(pixels), alpha=self._source.alpha)
 
     def source_of(self, d_x: wp.array, d_y: wp.array) -> np.ndarray:
         """Where each pixel's colour comes from: (height, width, 2), x and y [px of the source].

@@ -12,7 +12,7 @@ import numpy as np
 from wfluid import colour
 from wfluid.files import free_memory, quiet_stderr, readable_size, whole_file
 
-COLORSPACES = ("auto", "srgb", "linear")
+COLORSPACES = ("auto", "srgb", "linear", "data")
 
 TYPES = ("uint8", "uint16", "half", "float")
 """Number types a picture is written with."""
@@ -132,6 +132,8 @@ class Picture:
     """The OpenImageIO `ImageSpec` it came with, for writing."""
     srgb: bool | None = None
     """Whether the file's numbers were sRGB; None for what its number type says."""
+    data: bool = False
+    """Whether its numbers are no colours, so that no file converts them."""
 
     @property
     def width(self) -> int:
@@ -217,8 +219,9 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     """Read a still in any format that OpenImageIO reads; of several in one file, the first.
 
     `colorspace` says what the numbers are: "srgb", "linear", or "auto": sRGB for integers, linear for
-    half and float. Alpha is never linearised; where it is unassociated it multiplies the colours once
-    they are linear. The picture is turned upright by its EXIF orientation.
+    half and float; "data" are no colours, and written as they are read. Alpha is never linearised; where
+    it is unassociated it multiplies the colours once they are linear. The picture is turned upright by
+    its EXIF orientation.
 
     Raises:
         PictureError: no such file, one that cannot be read, is damaged, or is too large for the memory.
@@ -264,7 +267,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
         raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
     pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
     upright = _UPRIGHT.get(spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
-    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec, srgb)
+    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec, srgb, data=colorspace == "data")
 
 
 def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
@@ -316,12 +319,12 @@ def encode(picture: Picture, dtype: str, linear: bool, channels: int) -> tuple[n
     pixels = pixels[..., :channels] if alpha is None or alpha < channels else pixels[..., :3]
     if channels == 3 and pixels.shape[2] == 2:
         pixels = pixels[..., :1]
-    kind = _NUMPY[dtype]
+    kind, srgb = _NUMPY[dtype], not linear and not picture.data
     if linear or alpha is None:
-        return colour.encode(pixels, kind, srgb=not linear), alpha
+        return colour.encode(pixels, kind, srgb=srgb), alpha
     opacity = pixels[..., [alpha]]
     straight = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
-    stored = colour.encode(straight, kind, srgb=True)
+    stored = colour.encode(straight, kind, srgb=srgb)
     stored[..., alpha] = colour.encode(pixels[..., alpha], kind, srgb=False)
     return stored, alpha
 

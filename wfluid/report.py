@@ -12,6 +12,7 @@ from typing import Any
 
 from wfluid.animation import Animation, Frame
 from wfluid.files import whole_file
+from wfluid.forces import Force, flat
 from wfluid.linear import Residual
 from wfluid.painted import Keyed, Painted, Quantity
 from wfluid.picture import PictureError
@@ -33,6 +34,8 @@ class Report:
             "displacement_max_px": 0.0,
             "displacement_mean_px": 0.0,
             "outside_fraction": 0.0,
+            "divergence_prescribed_max": 0.0,
+            "divergence_removed_max": 0.0,
         }
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
@@ -51,6 +54,8 @@ class Report:
             ("displacement_mean_px", quality.displacement_mean * side),
             ("outside_fraction", quality.outside_fraction),
             ("divergence_max", frame.solve.divergence if frame.solve else 0.0),
+            ("divergence_prescribed_max", frame.solve.prescribed if frame.solve else 0.0),
+            ("divergence_removed_max", abs(frame.solve.removed) if frame.solve else 0.0),
         ):
             seen[name] = max(seen[name], value)
         if frame.solve:
@@ -68,6 +73,25 @@ class Report:
             ("backward_error_max", left.backward),
         ):
             seen[key] = max(seen[key], value)
+
+    def _loop(self) -> dict[str, Any]:
+        """What the loop's seam measures, where there is one."""
+        animation, seam = self.animation, self.animation.seam
+        if animation.loop is None:
+            return {}
+        side = max(animation.picture.width, animation.picture.height)
+        a_frame = side / animation.timeline.fps
+        return {
+            "loop": {
+                "kind": animation.loop,
+                "position_gap_px": {"max": seam.position_max * side, "mean": seam.position_mean * side},
+                "velocity_gap_px_per_frame": {
+                    "max": seam.velocity_max * a_frame,
+                    "mean": seam.velocity_mean * a_frame,
+                },
+                "drift_removed_px": {"max": seam.drift_max * side, "mean": seam.drift_mean * side},
+            }
+        }
 
     def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
         """The report; `seconds` adds the times that the animation does not know."""
@@ -89,6 +113,10 @@ class Report:
                 "substeps": animation.timeline.steps_per_frame,
                 "filter": animation.filter,
                 "edge": animation.edge,
+                "loop": animation.loop,
+                "forces": [_kind(force) for force in flat(animation.forces)],
+                "densities": list(fluid.density_names),
+                "layers": list(animation.layers),
             },
             "seconds": {
                 "compile": times.compile,
@@ -97,10 +125,19 @@ class Report:
                 **seconds,
             },
             **self.extremes,
+            "area": _area(self.extremes),
+            **self._loop(),
             "solves": self.solves,
             "device": str(animation.solver.device.name),
             "versions": versions(),
         }
+
+
+def _area(extremes: Mapping[str, float]) -> str:
+    """Whether areas should be preserved: the range of det J says how well they are."""
+    if extremes["divergence_prescribed_max"] > 0:
+        return "not preserved: sources of divergence make places grow or shrink"
+    return "preserved, but for what det J shows"
 
 
 def _described(viscosity: Quantity) -> float | list[float] | str:
@@ -110,6 +147,10 @@ def _described(viscosity: Quantity) -> float | list[float] | str:
     return (
         viscosity if isinstance(viscosity, float) else "keyed" if isinstance(viscosity, Keyed) else "of time"
     )
+
+
+def _kind(force: Force) -> str:
+    return type(force).__name__ + (" under a mask" if force.weight is not None else "")
 
 
 def versions() -> dict[str, str]:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from oracles import divergence
 
+from wfluid.command_scene import parse_force
+from wfluid.drawing import Drawing
 from wfluid.envelopes import Arbitrary, Constant, Fade, Instantaneous, Oscillator
 from wfluid.forces import GaussianForce, Group, Growth, Stroke, VortexForce, Wind, flat
 from wfluid.grid import Grid
 from wfluid.noise_force import NoiseForce
 from wfluid.painted import Painted
 from wfluid.paths import Path
-from wfluid.push import Push
 from wfluid.state import to_numpy
 from wfluid.walls import Walls
 
@@ -279,7 +280,7 @@ def carried(make_solver, force, duration, steps, n=128):
 )
 def test_a_push_carries_its_centre_by_its_arrow(make_solver, text, course):
     """Inviscid, arrow short beside the radius: within 10 % (walls, and the blob moves off its force)."""
-    force = Push.parse(text).force(512, 512, 1.0)
+    force = Drawing(512, 512, 1.0).force(parse_force("push", text))
     way = (carried(make_solver, force, 1.0, 96) - force.center) * 512
     reached = way[-1] if course == "end" else (way[48:].max(axis=0) - way[48:].min(axis=0)) / 2
     np.testing.assert_allclose(reached, (6, 3), rtol=0.1)
@@ -293,7 +294,9 @@ def test_an_oscillators_drift_per_period_is_bounded(make_solver):
     drift = {}
     for phase in (0.25, 0.0):
         text = f"256,256:5,0:radius=50,period=0.5,phase={phase}"
-        way = (carried(make_solver, Push.parse(text).force(512, 512, 2.0), 2.0, 192) - 0.5) * 512
+        way = (
+            carried(make_solver, Drawing(512, 512, 2.0).force(parse_force("push", text)), 2.0, 192) - 0.5
+        ) * 512
         last = way[-48:, 0]
         drift[phase] = abs(last.max() + last.min()) / 2 / 5
     assert drift[0.25] < 0.5, drift
@@ -310,17 +313,17 @@ def test_an_oscillators_drift_per_period_is_bounded(make_solver):
         ("3,4:1,nan", "not finite"),
         ("3,4:1,1:mass=3", "'mass=3' is not key=value"),
         ("3,4:1,1:radius", "'radius' is not key=value"),
-        ("3,4:1,1:radius=0", "radius 0 is not positive"),
+        ("3,4:1,1:radius=0", "radius: 0.0: expected a number above 0"),
         ("3,4:1,1:radius=1,radius=2", "given twice"),
         ("3,4:1,1:phase=0.2", "phase= needs period="),
         ("3,4:1,1:at=0,period=1", "at= is one blow"),
         ("3,4:1,1:start=2,end=1", "end 1 is not after start 2"),
-        ("3,4:1,1:at=-1", "before the animation"),
+        ("3,4:1,1:at=-1", "at: -1.0: expected a number from 0"),
     ],
 )
 def test_a_malformed_push_is_refused_by_its_part(text, says):
     with pytest.raises(ValueError, match=says):
-        Push.parse(text)
+        Drawing(100, 100, 3.0).force(parse_force("push", text))
 
 
 @pytest.mark.parametrize(
@@ -329,7 +332,7 @@ def test_a_malformed_push_is_refused_by_its_part(text, says):
 )
 def test_a_push_that_does_not_fit_is_refused(text, says):
     with pytest.raises(ValueError, match=says):
-        Push.parse(text).force(100, 100, 1.0)
+        Drawing(100, 100, 1.0).force(parse_force("push", text))
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def test_what_is_not_finite_in_a_picture_does_not_spread(tmp_path):
         (("--xyzzy",), "there is no flag --xyzzy"),
         (("extra.png",), "'extra.png' is one argument too many"),
         (("--cells", "8192", "--width", "30000"), "lower --cells or --width"),
-        (("--cells", "3"), "cells 3: expected 4"),
+        (("--cells", "3"), "--cells 3: expected a whole number from 4"),
         (("--cells", "many"), "invalid int value"),
         (("--scale", "0"), "scale 0.0"),
         (("--scale", "nan"), "scale nan"),
@@ -119,13 +119,13 @@ def test_what_is_not_finite_in_a_picture_does_not_spread(tmp_path):
         (("--edge", "torn"), "expected one of clamp, mirror, wrap, transparent"),
         (("--colorspace", "pink"), "expected one of auto, srgb, linear"),
         (("--type", "int3"), "expected one of uint8"),
-        (("--quality", "0"), "quality 0: expected 1"),
+        (("--quality", "0"), "--quality 0: expected a whole number from 1"),
         (("--compression", "gzip"), "expected one of"),
         (("--fps", "-1"), "fps -1.0"),
         (("--fps", "0.05", "--duration", "40", "--substeps", "1"), "steps of 20 s"),
         (("--fps", "0.0015", "--duration", "667"), "fps 0.0015"),
         (("--duration", "1e308"), "frames: expected 1"),
-        (("--push", "3,3:1,1:period=1e-200"), "period 1e-200: expected 0.001"),
+        (("--push", "3,3:1,1:period=1e-200"), "period: 1e-200: expected a number from 0.001"),
         (("--push", "3,3:1,1:end=1e-200"), "expected 0.001 s or more"),
         (("--duration", "0"), "duration 0.0"),
         (("--viscosity", "inf"), "viscosity inf"),
@@ -146,7 +146,7 @@ def test_mistakes_are_one_line_with_the_remedy(small, tmp_path, options, says):
         ("a.####.jpg", ("--type", "half"), ".jpg holds uint8, not half"),
         ("a.####.png", ("--quality", "50"), ".png has no quality"),
         ("a.####.png", ("--compression", "zip"), "not for .png"),
-        ("a.####.png", ("--start", "-2"), "first frame -2"),
+        ("a.####.png", ("--start", "-2"), "--start -2: expected a whole number from 0"),
         ("a.xyz", (), "cannot tell the output's kind"),
         ("a.##.xyz", (), "unknown picture format"),
         ("none/a.gif", (), "no such folder"),
@@ -183,7 +183,7 @@ def test_a_sequence_may_not_hold_the_input_nor_two_outputs_one_name(small, tmp_p
     assert result.returncode == 2 and "the picture itself" in result.stderr
     assert shot.read_bytes() == small.read_bytes()
     result = wfluid("animate", small, "-o", tmp_path / "a.gif", "--report", tmp_path / "a.gif", *PUSH, *QUICK)
-    assert result.returncode == 2 and "written by -o" in result.stderr
+    assert result.returncode == 2 and "written as the picture" in result.stderr
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

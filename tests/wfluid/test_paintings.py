@@ -93,7 +93,7 @@ def test_an_effect_mask_keeps_forces_to_its_white(folder, capsys):
     """Painted forces everywhere, then only on the white side: the far black side moves much less."""
     moved = []
     for mask in ((), ("--effect-mask", "right.png")):
-        assert run(capsys, "--force-image", "small.png:kind=contour,strength=4", *mask) == (0, "")
+        assert run(capsys, "--force-image", "small.png:along=contour,amount=4", *mask) == (0, "")
         moved.append(np.abs(sharp("o.1005.exr") - sharp("o.1001.exr"))[:, 2:18].mean())
     assert moved[1] < 0.5 * moved[0], moved
 
@@ -105,8 +105,8 @@ def test_an_effect_mask_keeps_forces_to_its_white(folder, capsys):
         (("--viscosity-image", "white.png", "--invert-viscosity"), ["white all over", "inviscid"]),
         (("--freeze", "black.png"), ["black.png: black all over, so nothing is frozen"]),
         (("--freeze", "square.png"), ["square.png: 40 x 40 pixels stretched over the picture's 60 x 40"]),
-        (("--force-image", "self"), ["pressure balances a gradient wholly", "kind=contour", "--effect-mask"]),
-        (("--force-image", "self:kind=contour"), []),
+        (("--force-image", "self"), ["pressure balances a gradient wholly", "along=contour", "mask"]),
+        (("--force-image", "self:along=contour"), []),
         (("--force-image", "self", "--effect-mask", "right.png"), []),
     ],
 )
@@ -134,30 +134,36 @@ def test_the_preview_tints_what_is_stiff_and_frozen(folder, capsys):
         (("--viscosity-image", "none.png"), "none.png: no such picture"),
         (("--viscosity-image", "nan.exr"), "nan.exr: 1 values are not finite"),
         (("--viscosity-image", "minus.exr"), "minus.exr: a picture with the value -1.0 has no intensity"),
-        (("--viscosity-image", "self", "--viscosity", "-2"), "viscosity -2.0: expected 0"),
-        (("--viscosity-image", "self", "--viscosity", "5000"), "viscosity 5000.0: expected 0"),
+        (
+            ("--viscosity-image", "self", "--viscosity", "-2"),
+            "--viscosity -2.0: expected a number",
+        ),
+        (
+            ("--viscosity-image", "self", "--viscosity", "5000"),
+            "--viscosity 5000.0: expected",
+        ),
         (("--viscosity-image", "self", "--viscosity-floor", "1"), "floor 1 is above scale 0.1"),
-        (("--viscosity-image", "self", "--viscosity-floor", "nan"), "floor with nan"),
+        (("--viscosity-image", "self", "--viscosity-floor", "nan"), "--viscosity-floor nan: expected"),
         (("--invert-viscosity",), "--invert-viscosity needs a --viscosity-image"),
         (("--viscosity-moves",), "--viscosity-moves needs a --viscosity-image"),
         (("--viscosity-floor", "0.1"), "--viscosity-floor needs a --viscosity-image"),
         (("--viscosity-floor", "0"), "--viscosity-floor needs a --viscosity-image"),
         (("--freeze", "white.png"), "white.png: the freeze mask is painted all over"),
-        (("--freeze", "black.png:-5"), "black.png: freeze strength -5.0: expected 0"),
-        (("--freeze", "black.png:nan"), "freeze strength nan"),
-        (("--freeze", "black.png:1e9"), "freeze strength 1000000000.0"),
+        (("--freeze", "black.png:-5"), "--freeze MASK:strength: -5.0: expected"),
+        (("--freeze", "black.png:nan"), "nan: expected a number from 0 to 1e+06"),
+        (("--freeze", "black.png:1e9"), "1000000000.0: expected a number from 0"),
         (("--freeze", "none.png:100"), "none.png: no such picture"),
         (("--freeze", "nan.exr"), "nan.exr: 1 values are not finite"),
         (("--effect-mask", "black.png"), "black.png: black all over, so no force would act"),
         (("--force-image", "none.png"), "none.png: no such picture"),
         (("--force-image", "black.png"), "black.png: ImageForce: the picture is the same everywhere"),
-        (("--force-image", "self:kind=swirl"), "kind 'swirl': expected one of gradient, contour, vectors"),
-        (("--force-image", "self:kind=contour,speed=3"), "'speed=3' is not key=value with a key of kind"),
+        (("--force-image", "self:along=swirl"), "along: 'swirl': expected one of gradient, contour, vectors"),
+        (("--force-image", "self:along=contour,speed=3"), "'speed=3' is not key=value with a key of along"),
         (("--force-image", "self:strength=strong"), "'strong' is not a number"),
         (("--force-image", "self:at=9"), "at=9: the animation lasts 0.4 s"),
-        (("--force-image", "self:strength=1e9"), "expected at most 10000"),
-        (("--force-image", "self:radius=-1"), "radius -0.0"),
-        (("--force-image", "black.png:kind=vectors"), "needs two channels"),
+        (("--force-image", "self:along=contour,amount=1e9"), "expected at most 10000"),
+        (("--force-image", "self:radius=-1"), "radius: -1.0: expected a number from 0"),
+        (("--force-image", "black.png:along=vectors"), "needs two channels"),
         (("-o", "x.####.png", "--freeze", "x.1005.png"), "that is a picture that is read"),
     ],
 )

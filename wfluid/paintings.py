@@ -1,0 +1,168 @@
+"""Controls that are picture files: viscosity, freezing, masks, forces, densities, layers.
+
+"self" is the picture that is animated. Any other file is read as numbers, without colour conversion,
+and stretched over the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wfluid.drawing import Drawing
+from wfluid.image_force import DEFAULT_RADIUS, ImageForce
+from wfluid.painted import DEFAULT_STRENGTH, Freeze, Keyed, Painted, Quantity
+from wfluid.picture import Picture, read_picture
+
+SELF = "self"
+
+DEFAULT_VISCOSITY = 0.001
+DEFAULT_PAINTED_VISCOSITY = 0.1
+"""Viscosity of a white place where nothing says it: over 6 % of the longer side it stops a motion in
+1/30 s."""
+
+DEFAULT_LENGTH = 0.02
+"""How far a painted force carries its strongest place where it does not say it [longer side]."""
+
+_SAME_ASPECT = 0.01
+
+
+@dataclass
+class Paintings:
+    """Reads paintings for one picture, and notes what a user should know of them."""
+
+    picture: Picture
+    """What is animated."""
+    folder: Path = Path()
+    """Where the names of files begin."""
+    note: Callable[[str], None] = field(default=lambda text: None)
+    """Called with a line of text."""
+
+    def read(self, name: str) -> Picture:
+        """The painting in a file, or the picture itself.
+
+        Raises:
+            PictureError: it cannot be read, or has values that are not finite.
+        """
+        if name == SELF:
+            return self.picture
+        painting = read_picture(self.folder / name, exact=True)
+        aspect = painting.width / painting.height * self.picture.height / self.picture.width
+        if abs(aspect - 1) > _SAME_ASPECT:
+            self.note(
+                f"{name}: {painting.width} x {painting.height} pixels stretched over the picture's "
+                f"{self.picture.width} x {self.picture.height}"
+            )
+        return painting
+
+    def paint(self, name: str) -> Picture:
+        """The painting; of the picture itself what is below zero, out of a camera's gamut, is no paint."""
+        painting = self.read(name)
+        return painting.with_pixels(np.maximum(painting.pixels, 0.0)) if name == SELF else painting
+
+    def viscosity(self, table: Mapping[str, Any]) -> Quantity:
+        """The viscosity that a scene's table says.
+
+        Raises:
+            ValueError: as `read`; a scale outside its range, keys that contradict.
+        """
+        if "key" in table:
+            if table.keys() & {"value", "image", "floor", "invert"}:
+                raise ValueError("viscosity: keys over time go without value, image, floor and invert")
+            keys = {
+                key["time"]: self.viscosity({k: key[k] for k in key if k != "time"}) for key in table["key"]
+            }
+            return Keyed(keys)
+        if "image" not in table:
+            for key in ("floor", "invert", "moves"):
+                if table.get(key):
+                    raise ValueError(f"viscosity: {key} needs an image")
+            return table.get("value", DEFAULT_VISCOSITY)
+        name, invert = table["image"], table.get("invert", False)
+        scale, floor = table.get("value", DEFAULT_PAINTED_VISCOSITY), table.get("floor", 0.0)
+        painted = _named(name, lambda: Painted(self.paint(name), scale, invert, floor))
+        if painted.values.max() == 0:
+            shade = "white" if invert else "black"
+            self.note(f"{name}: {shade} all over, so the viscosity is 0 everywhere: an inviscid fluid")
+        return painted
+
+    def mask(self, name: str | None) -> Painted | None:
+        """An effect mask, white where forces act.
+
+        Raises:
+            ValueError: as `read`; a mask that is black all over.
+        """
+        if name is None:
+            return None
+        painted = _named(name, lambda: Painted(self.paint(name)))
+        if painted.values.max() == 0:
+            raise ValueError(f"{name}: black all over, so no force would act; paint white what should move")
+        return painted
+
+    def freeze(self, table: Mapping[str, Any] | None) -> Freeze | None:
+        """The freezing that a scene's table says.
+
+        Raises:
+            ValueError: as `read`; a strength outside its range, a mask that leaves nothing to move.
+        """
+        if not table:
+            return None
+        name, strength = table["mask"], table.get("strength", DEFAULT_STRENGTH)
+        frozen = _named(name, lambda: Freeze(self.paint(name), strength))
+        if frozen.paint.values.max() == 0:
+            self.note(f"{name}: black all over, so nothing is frozen")
+        return frozen
+
+    def amount(self, name: str, scale: float) -> Painted:
+        """A density that a picture paints; `scale` is that of its white.
+
+        Raises:
+            ValueError: as `read`.
+        """
+        return _named(name, lambda: Painted(self.paint(name), scale))
+
+    def force(self, table: Mapping[str, Any], drawing: Drawing, weight: Painted | None) -> ImageForce:
+        """The force of a picture.
+
+        Raises:
+            ValueError: as `read`; a window outside the animation.
+        """
+        name, kind, side = table["file"], table.get("along", "gradient"), drawing.side
+        envelope, per_length = drawing.course(f"force image {name}", table)
+        length = table["amount"] / side if "amount" in table else DEFAULT_LENGTH
+        radius = table["radius"] / side if "radius" in table else DEFAULT_RADIUS
+        read = self.read if kind == "vectors" else self.paint
+        force = _named(
+            name,
+            lambda: ImageForce(read(name), kind, length * per_length, envelope, weight, radius),
+        )
+        if kind == "gradient" and weight is None:
+            self.note(
+                f"{name}: the pressure balances a gradient wholly, so alone it moves nothing; "
+                "use along=contour, or give it a mask"
+            )
+        return force
+
+    def layer(self, name: str, data: bool | None) -> Picture:
+        """A further picture; one of a single channel is data where nothing says otherwise.
+
+        Raises:
+            PictureError: it cannot be read.
+        """
+        picture = read_picture(self.folder / name)
+        channels = picture.pixels.shape[2] - (picture.alpha is not None)
+        data = channels == 1 if data is None else data
+        return read_picture(self.folder / name, "data") if data else picture
+
+
+def _named(name: str, make: Callable):
+    """What `make` makes; where it refuses, the file is named."""
+    try:
+        return make()
+    except ValueError as error:
+        text = str(error)
+        raise ValueError(text if text.startswith(name) or name in text else f"{name}: {text}") from error

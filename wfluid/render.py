@@ -1,0 +1,275 @@
+"""Runs a scene from the command line: says what it will do, writes all its outputs, reports."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from wfluid.animation import Animation, Frame
+from wfluid.device import kernels_are_built, open_device
+from wfluid.estimate import check_memory, estimate
+from wfluid.files import readable_size
+from wfluid.output import check_folder, names, open_output
+from wfluid.picture import Picture, resample, write_picture
+from wfluid.preview import draw_controls
+from wfluid.report import Report, write_report
+from wfluid.scene import Output, Scene, write_scene
+from wfluid.staging import stage
+from wfluid.tracks import Tracks
+
+QUEUED_FRAMES = 4
+"""Frames that may wait for the disk while the next ones are computed."""
+
+STREAMED = 0.5
+"""Part of the longest displacement that an oscillating loop may stream before that is said."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a scene is run."""
+
+    device: str | None = None
+    """"cpu" (default), "cuda", …"""
+    quiet: bool = False
+    """No progress and no notes on stderr."""
+    dry_run: bool = False
+    """Say what would be computed and written, and stop."""
+    preview: str | None = None
+    """Draw the controls on the picture to this file, and stop."""
+    save_scene: str | None = None
+    """Write the scene to this file, and go on if there is an output."""
+
+
+class _Writer(Protocol):
+    written: list[Path]
+
+    def close(self) -> None: ...
+    def abandon(self) -> None: ...
+
+
+def run_scene(scene: Scene, how: Run) -> int:
+    """Run a scene; the exit code.
+
+    Raises:
+        ValueError: what is wrong with the scene or with the files it names.
+    """
+    began = time.perf_counter()
+    tables = scene.tables
+    if not any(tables.get(key) for key in ("force", "density")):
+        raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
+    if not scene.outputs and not how.preview and not how.save_scene:
+        raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
+    _check_names(scene, how)
+
+    def note(text: str) -> None:
+        if not how.quiet:
+            print(f"wfluid: note: {text}", file=sys.stderr)
+
+    animation = stage(scene, how.device, note)
+    check_memory(animation, _kept_frames(scene.outputs))
+    writers = [] if how.preview or how.dry_run else _writers(scene, animation)
+    if how.dry_run:
+        _say_plan(animation, scene.outputs)
+        return 0
+    if how.save_scene:
+        write_scene(how.save_scene, _with_size(scene, animation.picture))
+    if how.preview:
+        write_picture(how.preview, draw_controls(scene, animation))
+    if how.preview or not scene.outputs:
+        return 0
+    _load(animation, how.quiet)
+    report = Report(animation)
+    writing = _write_frames(animation, writers, report, how.quiet)
+    _judge_loop(animation, report, note)
+    times = {"write": writing, "total": time.perf_counter() - began}
+    for output in scene.outputs:
+        if output.of == "report":
+            write_report(output.file, report.as_dict(times))
+    return 0
+
+
+def _with_size(scene: Scene, picture: Picture) -> Scene:
+    """The scene, saying what its pixels refer to."""
+    size = {"size": [picture.width, picture.height]}
+    tables = {**scene.tables, "picture": {**size, **scene.tables["picture"]}}
+    return Scene(tables, scene.folder, scene.source, scene.lines, scene.flags)
+
+
+def _check_names(scene: Scene, how: Run) -> None:
+    """Refuse to write over what is read, or one file twice."""
+    frames = scene.timeline.frames
+    taken = {path.resolve(): "a picture that is read" for path in scene.files()}
+    taken[(scene.folder / scene.tables["picture"]["file"]).resolve()] = "the picture itself"
+    written = [(output.file, f"written as the {output.of}", output.start) for output in scene.outputs]
+    for flag, name in (("--preview", how.preview), ("--save-scene", how.save_scene)):
+        if name is not None:
+            written.append((Path(name), f"written by {flag}", 0))
+    for path, what, start in written:
+        check_folder(path)
+        for name in names(path, start, frames):
+            if name in taken:
+                raise ValueError(f"{name}: that is {taken[name]}; write to another name")
+            taken[name] = what
+
+
+def _kept_frames(outputs: Sequence[Output]) -> int:
+    """How many outputs hold every frame until the last."""
+    return sum(output.file.suffix.lower() == ".gif" for output in outputs)
+
+
+def _writers(scene: Scene, animation: Animation) -> list[tuple[_Writer, Callable[[Frame], None]]]:
+    """What writes each output, and how it takes a frame."""
+    found = []
+    width, height = scene.tables["picture"].get("size", (animation.picture.width, animation.picture.height))
+    for output in scene.outputs:
+        if output.of == "report":
+            continue
+        if output.of == "tracks":
+            tracks = Tracks(output.file, max(width, height))
+            found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
+            continue
+        writer = open_output(output.file, animation.timeline.fps, output.start, output.encoding)
+        found.append((writer, lambda frame, w=writer, of=output.of: w.write(_shown(frame, of))))
+    return found
+
+
+def _shown(frame: Frame, of: str) -> Picture:
+    """The picture of a frame that an output is of; a density is shown as its numbers."""
+    if of == "picture":
+        return frame.picture
+    if of in frame.layers:
+        return frame.layers[of]
+    width, height = frame.picture.width, frame.picture.height
+    values = resample(frame.densities[of].astype(np.float32), width, height, filter="bspline")
+    return Picture(np.maximum(values, 0.0)[..., None], dtype="float", data=True)
+
+
+def _say_plan(animation: Animation, outputs: Sequence[Output]) -> None:
+    """Print what a run would take and write."""
+    timeline, grid, guess = animation.timeline, animation.grid, estimate(animation, _kept_frames(outputs))
+    steps = (timeline.frames - 1) * timeline.steps_per_frame
+    size = animation.width or animation.picture.width, animation.height or animation.picture.height
+    print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")
+    print(f"grid      {grid.nx} x {grid.ny} cells")
+    print(f"steps     {steps} of {timeline.dt:.4g} s, {timeline.steps_per_frame} a frame")
+    print(f"frames    {animation.frame_count} of {size[0]} x {size[1]} pixels at {timeline.fps:g} a second")
+    print(f"memory    about {readable_size(guess.memory)}")
+    print(f"time      about {guess.seconds:.1f} s on one core, without compiling and writing")
+    print(f"writes    {', '.join(str(output.file) for output in outputs) or 'nothing'}")
+
+
+def _load(animation: Animation, quiet: bool) -> None:
+    """Load the kernels, saying so where that takes a compiler."""
+    device = open_device(animation.device)
+    new = not kernels_are_built(device)
+    if new and not quiet:
+        print(f"compiling the kernels for {device.name}, once …", file=sys.stderr, flush=True)
+    seconds = animation.solver.compile_seconds
+    if new and not quiet:
+        print(f"compiled in {seconds:.1f} s", file=sys.stderr)
+
+
+def _judge_loop(animation: Animation, report: Report, note: Callable[[str], None]) -> None:
+    """Say where a loop had to be bent far to close."""
+    drift, longest = animation.seam.drift_max, report.extremes["displacement_max_px"]
+    side = max(animation.picture.width, animation.picture.height)
+    if animation.loop == "oscillate" and drift * side > STREAMED * longest:
+        note(
+            f"the flow streams {drift * side:.0f} px over the loop, which was taken off its frames; "
+            "a loop of one period, more viscosity or a smaller force streams less"
+        )
+
+
+def _write_frames(
+    animation: Animation,
+    writers: Sequence[tuple[_Writer, Callable[[Frame], None]]],
+    report: Report,
+    quiet: bool,
+) -> float:
+    """Compute frames and write them from a second thread; returns the seconds spent writing."""
+    writing = 0.0
+
+    def write(frame: Frame) -> None:
+        nonlocal writing
+        start = time.perf_counter()
+        for _, take in writers:
+            take(frame)
+        writing += time.perf_counter() - start
+
+    waiting: list[Future] = []
+    try:
+        with ThreadPoolExecutor(1) as pool, _progress(animation.frame_count, quiet) as advance:
+            for frame in animation.frames():
+                report.add(frame)
+                if len(waiting) >= QUEUED_FRAMES:
+                    waiting.pop(0).result()
+                waiting.append(pool.submit(write, frame))
+                advance()
+            for future in waiting:
+                future.result()
+        start = time.perf_counter()
+        for writer, _ in writers:
+            writer.close()
+        return writing + time.perf_counter() - start
+    except KeyboardInterrupt:
+        for writer, _ in writers:
+            writer.close()  # what is there is whole: a movie ends at its last frame
+        print(f"interrupted; finished: {_finished(writers)}", file=sys.stderr)
+        raise
+    except BaseException:
+        for writer, _ in writers:
+            writer.abandon()
+        raise
+
+
+def _finished(writers: Sequence[tuple[_Writer, Callable[[Frame], None]]]) -> str:
+    """The files that are whole, of a sequence the first and the last."""
+    found = []
+    for writer, _ in writers:
+        ends = [str(path) for path in writer.written[:1] + writer.written[1:][-1:]]
+        found.append((" … " if len(writer.written) > 2 else ", ").join(ends))
+    return ", ".join(filter(None, found)) or "nothing"
+
+
+class _progress:
+    """A bar on stderr with frame rate and remaining time; silent when quiet or not on a terminal."""
+
+    def __init__(self, frames: int, quiet: bool):
+        self.frames, self.quiet = frames, quiet or not sys.stderr.isatty()
+
+    def __enter__(self) -> Callable[[], None]:
+        if self.quiet:
+            return lambda: None
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self.bar = Progress(
+            TextColumn("frames"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]:.1f} frames/s"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+        )
+        task = self.bar.add_task("frames", total=self.frames, rate=0.0)
+        self.bar.start()
+        start = time.perf_counter()
+        done = 0
+
+        def advance() -> None:
+            nonlocal done
+            done += 1
+            self.bar.update(task, advance=1, rate=done / (time.perf_counter() - start))
+
+        return advance
+
+    def __exit__(self, *_) -> None:
+        if not self.quiet:
+            self.bar.stop()

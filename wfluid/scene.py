@@ -1,0 +1,318 @@
+"""Scenes: one TOML file that says a whole shot.
+
+`scene_format` has the keys, `staging` makes the animation. Files are named relative to the scene's folder.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import ParseError, TOMLKitError
+
+from wfluid.files import whole_file
+from wfluid.output import FIRST_FRAME
+from wfluid.paintings import SELF
+from wfluid.picture import Encoding, PictureError
+from wfluid.scene_format import SCENE
+from wfluid.schema import Key, Many, Named, SchemaError, Variants, checked, dotted, nearest
+from wfluid.timeline import Timeline
+
+SHOWN = ("picture", "tracks", "report")
+"""What an output may be of, beside layers and densities."""
+
+
+class SceneError(ValueError):
+    """A scene that cannot be read or makes no sense; the message names file, line where known, and key."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """A file, or a sequence of files, that a scene writes."""
+
+    file: Path
+    """Its name."""
+    of: str = "picture"
+    """What it shows: "picture", "tracks", "report", or a layer's or a density's name."""
+    start: int = FIRST_FRAME
+    """Number of a sequence's first frame."""
+    encoding: Encoding = field(default_factory=Encoding)
+    """How stills are written."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Tables of a shot, checked against `scene_format.SCENE`.
+
+    Raises:
+        SceneError: a key that is unknown, missing or has a wrong value; names that do not fit together.
+    """
+
+    tables: Mapping[str, Any]
+    """Nested dictionaries and lists, as TOML gives them."""
+    folder: Path = Path()
+    """Where the names of files begin."""
+    source: str = "scene"
+    """What to call it in messages."""
+    lines: Mapping[tuple, int] = field(default_factory=dict, repr=False, compare=False)
+    """Line of the file by a key's path, where known."""
+    flags: Mapping[tuple, str] = field(default_factory=dict, repr=False, compare=False)
+    """What of a command line a key's path comes from, where the scene is one."""
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "tables", checked(SCENE, self.tables))
+            self._check_names()
+        except SchemaError as error:
+            raise self.error(error) from None
+
+    def error(self, error: SchemaError) -> SceneError:
+        """What is wrong with a key, with the scene's name and line, or with the flag it comes from."""
+        path = error.path
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.flags:
+                flag, inner = self.flags[path[:end]], path[end:]
+                if inner or " " in flag or not error.about_value:
+                    flag = f"{flag}: {dotted(inner)}:" if inner else f"{flag}:"
+                return SceneError(f"{flag} {error.reason}")
+            if path[:end] in self.lines:
+                return SceneError(f"{self.source}:{self.lines[path[:end]]}: {error}")
+        return SceneError(f"{self.source}: {error}")
+
+    def _check_names(self) -> None:
+        """Refuse names that nothing has."""
+        tables = self.tables
+        if "picture" not in tables:
+            raise SchemaError((), "[picture] is missing: what is animated")
+        groups = [group["name"] for group in tables.get("group", [])]
+        layers = [layer["name"] for layer in tables.get("layer", [])]
+        densities = [density["name"] for density in tables.get("density", [])]
+        envelopes = list(tables.get("envelopes", {}))
+        for n, force in enumerate(tables.get("force", [])):
+            _one_of(("force", n, "group"), force.get("group"), groups)
+            if force["kind"] == "buoyancy":
+                _one_of(("force", n, "density"), force["density"], densities)
+        for path, names in _envelope_uses(tables):
+            for name in names:
+                _one_of(path, name, envelopes)
+        for n, name in enumerate([*layers, *densities]):
+            kind, index = ("layer", n) if n < len(layers) else ("density", n - len(layers))
+            if name in SHOWN or name in [*layers, *densities][:n]:
+                raise SchemaError(
+                    (kind, index, "name"), f"{name!r} is taken: outputs could not tell them apart"
+                )
+        for n, output in enumerate(tables.get("output", [])):
+            _one_of(("output", n, "of"), output.get("of"), [*SHOWN, *layers, *densities])
+
+    def with_values(self, settings: Sequence[str]) -> Scene:
+        """The scene with some values set, each as "path=value"; the value is TOML, or else a text.
+
+        An item of a list is named by its number from 0, or by its name.
+
+        Raises:
+            SceneError: a setting without "=", a path that leads nowhere, or a value that is wrong.
+        """
+        tables = _copied(self.tables)
+        for setting in settings:
+            path, equals, value = setting.partition("=")
+            if not equals or not path.strip():
+                raise SceneError(f"--set {setting!r}: expected key=value, such as time.duration=3")
+            _set(tables, path.strip().split("."), _value(value), setting)
+        return Scene(tables, self.folder, self.source, self.lines, self.flags)
+
+    def writing(self, pictures: Sequence[str], report: str | None) -> Scene:
+        """The scene with these outputs in the current folder, not its own of the picture; and a report."""
+        tables = _copied(self.tables)
+        outputs = tables.setdefault("output", [])
+        here = [os.path.abspath(name) for name in pictures]
+        if here:
+            outputs[:] = [output for output in outputs if output.get("of", "picture") != "picture"]
+        outputs += [{"file": name} for name in here]
+        outputs += [{"file": os.path.abspath(report), "of": "report"}] if report else []
+        return Scene(tables, self.folder, self.source, self.lines, self.flags)
+
+    def moved(self, folder: Path) -> Scene:
+        """The same scene for a file in another folder: its names of files begin there."""
+
+        def renamed(name: str) -> str:
+            if name == SELF or os.path.isabs(name):
+                return name
+            return os.path.relpath(self.folder / name, folder)
+
+        return Scene(_files_renamed(SCENE, self.tables, renamed), folder, self.source, self.lines, self.flags)
+
+    def files(self) -> list[Path]:
+        """Every file that the scene reads."""
+        found: list[str] = []
+        _files_renamed(SCENE, {**self.tables, "output": []}, lambda name: found.append(name) or name)
+        return [self.folder / name for name in found if name != SELF]
+
+    @property
+    def outputs(self) -> list[Output]:
+        """What is written.
+
+        Raises:
+            PictureError: an encoding that no format has.
+        """
+        return [
+            Output(
+                self.folder / table["file"],
+                table.get("of", "picture"),
+                table.get("start", FIRST_FRAME),
+                Encoding(table.get("type"), table.get("compression"), table.get("quality")),
+            )
+            for table in self.tables.get("output", [])
+        ]
+
+    @property
+    def timeline(self) -> Timeline:
+        """When frames are shown.
+
+        Raises:
+            ValueError: a length or a rate outside its range.
+        """
+        time = self.tables.get("time", {})
+        return Timeline(time.get("duration", 2.0), time.get("fps", 15.0), time.get("substeps"))
+
+
+def read_scene(path: str | os.PathLike) -> Scene:
+    """The scene in a TOML file.
+
+    Raises:
+        SceneError: no such file, no TOML (with line and column), or keys that are wrong.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise SceneError(f"{path}: no such scene") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or 'no UTF-8'})"
+        ) from None
+    try:
+        tables = tomlkit.parse(text).unwrap()
+    except ParseError as error:
+        reason = re.sub(r" at line \d+ col \d+$", "", str(error))
+        raise SceneError(f"{path}:{error.line}:{error.col}: no TOML: {reason}") from None
+    except TOMLKitError as error:
+        raise SceneError(f"{path}: no TOML: {error}") from None
+    return Scene(tables, path.parent, str(path), _lines_of(text))
+
+
+def write_scene(path: str | os.PathLike, scene: Scene) -> None:
+    """Write a scene as TOML, whole or not at all, its names of files relative to it.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    path = Path(path)
+    document = tomlkit.document()
+    for key, value in scene.moved(path.parent).tables.items():
+        document[key] = value
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def _one_of(path: tuple, name: str | None, known: Sequence[str]) -> None:
+    if name is not None and name not in known:
+        there = f"there is {', '.join(known)}" if known else "there is none"
+        raise SchemaError(path, f"{name!r}: no such {path[-1]}; {there}{nearest(name, known)}")
+
+
+def _envelope_uses(tables: Mapping[str, Any]) -> Iterator[tuple[tuple, list[str]]]:
+    for kind in ("force", "group"):
+        for n, table in enumerate(tables.get(kind, [])):
+            yield (kind, n, "envelope"), table.get("envelope", [])
+    for n, density in enumerate(tables.get("density", [])):
+        for m, source in enumerate(density.get("source", [])):
+            yield ("density", n, "source", m, "envelope"), source.get("envelope", [])
+
+
+def _copied(tables: Any) -> Any:
+    if isinstance(tables, Mapping):
+        return {key: _copied(value) for key, value in tables.items()}
+    return [_copied(value) for value in tables] if isinstance(tables, list) else tables
+
+
+def _value(text: str) -> Any:
+    """A TOML value; what is none is a text."""
+    try:
+        return tomlkit.parse(f"value = {text}").unwrap()["value"]
+    except TOMLKitError:
+        return text
+
+
+def _set(tables: Any, path: list[str], value: Any, setting: str) -> None:
+    at = tables
+    for n, step in enumerate(path):
+        last = n == len(path) - 1
+        if isinstance(at, list):
+            step = _item(at, step, setting)
+        elif isinstance(at, dict):
+            if not last and step not in at:
+                at[step] = {}
+        else:
+            raise SceneError(f"--set {setting!r}: {'.'.join(path[:n])} is a value, not a table")
+        if last:
+            at[step] = value
+        else:
+            at = at[step]
+
+
+def _item(items: list, step: str, setting: str) -> int:
+    names = [item.get("name") for item in items if isinstance(item, dict)]
+    if step in names:
+        return names.index(step)
+    if step.isdecimal() and int(step) < len(items):
+        return int(step)
+    there = [name for name in names if name]
+    raise SceneError(f"--set {setting!r}: no item {step!r} of {len(items)}{nearest(step, there)}")
+
+
+def _files_renamed(what: Any, value: Any, rename: Callable[[str], str]) -> Any:
+    """The value with what names a file renamed."""
+    if isinstance(what, Key):
+        return rename(value) if what.file else value
+    if isinstance(what, Many):
+        return [_files_renamed(what.each, item, rename) for item in value]
+    if isinstance(what, Named):
+        return {name: _files_renamed(what.each, item, rename) for name, item in value.items()}
+    keys = what.tables[value["kind"]].keys if isinstance(what, Variants) else what.keys
+    return {
+        name: _files_renamed(keys[name], item, rename) if name in keys else item
+        for name, item in value.items()
+    }
+
+
+_HEADING = re.compile(r"^\s*\[(\[)?\s*([^\[\]]+?)\s*\]")
+_SETTING = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
+
+
+def _lines_of(text: str) -> dict[tuple, int]:
+    """Line by path, of headings and of keys at the beginning of a line."""
+    found: dict[tuple, int] = {}
+    counts: dict[tuple, int] = {}
+    table: tuple = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if heading := _HEADING.match(line):
+            table = ()
+            steps = [step.strip(" \"'") for step in heading[2].split(".")]
+            for n, step in enumerate(steps):
+                table = (*table, step)
+                if heading[1] and n == len(steps) - 1:
+                    counts[table] = counts.get(table, -1) + 1
+                if table in counts:
+                    table = (*table, counts[table])
+            found.setdefault(table, number)
+        elif setting := _SETTING.match(line):
+            found.setdefault((*table, *(step.strip(" \"'") for step in setting[1].split("."))), number)
+    return found

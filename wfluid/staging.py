@@ -1,0 +1,208 @@
+"""Scenes made into animations: files read, pixels turned into lengths, names into what they stand for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from wfluid import colour
+from wfluid.animation import Animation
+from wfluid.density import Density, PaintedSource, Source
+from wfluid.drawing import Drawing
+from wfluid.envelopes import product
+from wfluid.fluid import Fluid
+from wfluid.forces import Force, Group
+from wfluid.paintings import Paintings
+from wfluid.picture import Picture, PictureError, read_picture
+from wfluid.scene import Scene
+from wfluid.schema import SchemaError
+
+_SAME_ASPECT = 0.01
+
+
+def stage(
+    scene: Scene, device: str | None = None, note: Callable[[str], None] = lambda text: None
+) -> Animation:
+    """The animation that a scene describes; `note` is called with what a user should know.
+
+    Raises:
+        SceneError: a value that makes no sense, with its key and line.
+        PictureError: a file that cannot be read.
+    """
+    try:
+        return _Stage(scene, note).animation(device)
+    except SchemaError as error:
+        raise scene.error(error) from error
+
+
+class _Stage:
+    """What the tables of one scene refer to."""
+
+    def __init__(self, scene: Scene, note: Callable[[str], None]):
+        self.scene, self.tables, self.note = scene, scene.tables, note
+        self._fluid()  # what is wrong without files is said before they are read
+        self.timeline = _at(("time",), lambda: scene.timeline)
+        self.loop = self.tables.get("time", {}).get("loop")
+        picture = self.tables["picture"]
+        self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
+        self.paintings = Paintings(self.picture, scene.folder, note)
+        self.drawing = self._drawing()
+
+    def animation(self, device: str | None) -> Animation:
+        """All of it together."""
+        frames, cells = self.tables.get("frames", {}), self.tables.get("fluid", {}).get("cells", 256)
+        width, height = _at(("frames",), lambda: _size(frames, self.picture))
+        fluid, forces, layers, points = self._whole_fluid(), self._forces(), self._layers(), self._points()
+
+        def make() -> Animation:
+            return Animation(
+                self.picture,
+                fluid,
+                forces,
+                self.timeline,
+                cells=cells,
+                width=width,
+                height=height,
+                filter=frames.get("filter", "cubic"),
+                edge=frames.get("edge", "clamp"),
+                device=device,
+                layers=layers,
+                points=points,
+                loop=self.loop,
+            )
+
+        return _at(("time", "loop"), make) if self.loop else make()
+
+    def _drawing(self) -> Drawing:
+        """What the numbers of the scene's forces refer to."""
+        picture, tables = self.picture, self.tables
+        width, height = tables["picture"].get("size", (picture.width, picture.height))
+        if min(width, height) <= 0:
+            raise SchemaError(("picture", "size"), f"{width:g} x {height:g}: expected positive numbers")
+        if abs(width / height * picture.height / picture.width - 1) > _SAME_ASPECT:
+            self.note(
+                f"the scene's pixels refer to {width:g} x {height:g}, the picture has "
+                f"{picture.width} x {picture.height}: its places are stretched"
+            )
+        settings = {
+            "width": width,
+            "height": height,
+            "duration": self.timeline.duration,
+            "scheme": tables.get("fluid", {}).get("scheme", "standard"),
+            "loop": self.loop,
+        }
+        plain = Drawing(**settings)
+        envelopes = {
+            name: _at(("envelopes", name), lambda name=name, table=table: plain.envelope(name, table))
+            for name, table in tables.get("envelopes", {}).items()
+        }
+        mask = tables.get("effect", {}).get("mask")
+        return Drawing(
+            **settings,
+            envelopes=envelopes,
+            seed=tables.get("seed", 0),
+            weight=_at(("effect", "mask"), lambda: self.paintings.mask(mask)),
+            paintings=self.paintings,
+        )
+
+    def _fluid(self, **more: Any) -> Fluid:
+        fluid = self.tables.get("fluid", {})
+        keys = ("walls", "scheme", "solver", "pressure_cycles")
+        return _at(("fluid",), lambda: Fluid(**{key: fluid[key] for key in keys if key in fluid}, **more))
+
+    def _whole_fluid(self) -> Fluid:
+        """The fluid with all that is painted and dissolved."""
+        viscosity, densities = self.tables.get("viscosity", {}), self.tables.get("density", [])
+        return self._fluid(
+            viscosity=_at(("viscosity",), lambda: self.paintings.viscosity(viscosity)),
+            viscosity_moves=viscosity.get("moves", False),
+            freeze=_at(("freeze",), lambda: self.paintings.freeze(self.tables.get("freeze"))),
+            densities=[
+                _at(("density", n), lambda table=table: self._density(table))
+                for n, table in enumerate(densities)
+            ],
+        )
+
+    def _density(self, table: Mapping[str, Any]) -> Density:
+        name = f"density {table['name']}"
+        given = {key: table[key] for key in ("name", "look", "diffusion") if key in table}
+        if "color" in table:
+            given["color"] = linear_color(table["color"])
+        if "image" in table:
+            given["initial"] = self.paintings.amount(table["image"], table.get("amount", 1.0))
+        sources = [self._source(f"a source of {name}", source) for source in table.get("source", [])]
+        return Density(sources=sources, **given)
+
+    def _source(self, what: str, table: Mapping[str, Any]) -> Source | PaintedSource:
+        """A source that pours its amount in all, over its course."""
+        drawing = self.drawing
+        envelope, _ = drawing.course(what, table)
+        whole = abs(envelope.integral(0.0, drawing.duration))
+        if not whole:
+            raise ValueError(f"{what}: its envelope pours nothing in all")
+        rate = table.get("amount", 1.0) / whole
+        if "image" not in table:
+            return Source(drawing.center(what, table), rate, drawing.radius(table), envelope)
+        if table.keys() & {"center", "path", "radius"}:
+            raise ValueError(f"{what}: an image goes without center, path and radius")
+        return PaintedSource(self.paintings.amount(table["image"], 1.0), rate * envelope)
+
+    def _forces(self) -> list[Force | Group]:
+        """The forces, those of a group together."""
+        found: list[Force | Group] = []
+        groups = self.tables.get("group", [])
+        members: dict[str, list[Force]] = {group["name"]: [] for group in groups}
+        for n, table in enumerate(self.tables.get("force", [])):
+            force = _at(("force", n), lambda table=table: self.drawing.force(table))
+            members.get(table.get("group"), found).append(force)
+        for n, group in enumerate(groups):
+            found.append(_at(("group", n), lambda group=group: self._group(group, members[group["name"]])))
+        return found
+
+    def _group(self, table: Mapping[str, Any], members: list[Force]) -> Group:
+        name, strength = table["name"], table.get("strength", 1.0)
+        common = product(strength, *self.drawing.named(f"group {name}", table.get("envelope", [])))
+        return Group(members, common, name=name)
+
+    def _layers(self) -> dict[str, Picture]:
+        return {
+            layer["name"]: self.paintings.layer(layer["file"], layer.get("data"))
+            for layer in self.tables.get("layer", [])
+        }
+
+    def _points(self) -> list[tuple[float, float]]:
+        points = self.tables.get("tracks", {}).get("points", [])
+        return [_at(("tracks", "points"), lambda at=at: self.drawing.place("a point", at)) for at in points]
+
+
+def linear_color(text: str) -> tuple[float, float, float]:
+    """Red, green and blue in linear light of a display colour "#rrggbb"."""
+    codes = np.array([int(text[n : n + 2], 16) for n in (1, 3, 5)], dtype=np.uint8)
+    red, green, blue = (float(value) for value in colour.decode(codes, True))
+    return red, green, blue
+
+
+def _size(frames: Mapping[str, Any], picture: Picture) -> tuple[int | None, int | None]:
+    """Width and height of the frames."""
+    width, scale = frames.get("width"), frames.get("scale")
+    if width is None and scale is None:
+        return None, None
+    if width is not None and scale is not None:
+        raise ValueError("width and scale both say the size: give one")
+    if scale is not None and not (math.isfinite(scale) and scale > 0):
+        raise ValueError(f"scale {scale}: expected a positive number")
+    width = width if scale is None else max(1, round(scale * picture.width))
+    return width, max(1, round(width * picture.height / picture.width))
+
+
+def _at(path: tuple, make: Callable[[], Any]) -> Any:
+    """What `make` makes; where it refuses, the key is named."""
+    try:
+        return make()
+    except (SchemaError, PictureError):
+        raise
+    except (ValueError, TypeError) as error:
+        raise SchemaError(path, str(error)) from error
