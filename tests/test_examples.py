@@ -49,6 +49,27 @@ def test_the_variable_viscosity_check_holds(device):
         example.check([made[0], made[1], made[1]])
 
 
+def test_every_scene_shows_its_control(device):
+    """Each moves and does not fold; areas change by what the growth says and by nothing else."""
+    example = load("scene_sheet")
+    made = example.animations(cells=64, width=32, device=device.alias)
+    frames = {name: list(animation.frames()) for name, animation in made.items()}
+    print(example.check(frames))
+    assert len(frames) == len(list((ROOT / "examples" / "scenes").glob("*.toml"))) >= 20
+    assert made["layers"].layers and len(frames["layers"][-1].points) == 3
+    with pytest.raises(AssertionError):
+        example.check({"grow": frames["vortex"]})
+    with pytest.raises(AssertionError):
+        example.check({"vortex": frames["vortex"][:1]})
+
+
+def test_the_scenes_reference_is_what_the_command_prints():
+    from wfluid.scene_format import reference
+
+    text = (ROOT / "examples" / "scenes" / "README.md").read_text()
+    assert text.endswith(reference())
+
+
 def test_any_picture_moves(device):
     example = load("any_picture")
     assert example.check(list(example.frames(example.CAT, cells=48, device=device.alias))) > 0.005
@@ -63,9 +84,12 @@ def test_examples_refuse_unknown_options(tmp_path):
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["oscillator", "viscosity", "variable_viscosity", "any_picture"])
+@pytest.mark.parametrize(
+    "name", ["oscillator", "viscosity", "variable_viscosity", "any_picture", "scene_sheet"]
+)
 def test_an_example_writes_its_animation(tmp_path, name):
-    command = [sys.executable, str(ROOT / "examples" / f"{name}.py"), "--frames", "3", "--cells", "32"]
+    cells = "64" if name == "scene_sheet" else "32"
+    command = [sys.executable, str(ROOT / "examples" / f"{name}.py"), "--frames", "3", "--cells", cells]
     result = subprocess.run(
         [*command, "--output", "out.####.png"], cwd=tmp_path, capture_output=True, text=True
     )

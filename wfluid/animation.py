@@ -177,7 +177,7 @@ class Animation:
                 for look_up in (shown, *layers.values())
             )
             densities = state.densities
-            picture = show_densities(picture, self.fluid.densities, densities)
+            picture = show_densities(picture, self.fluid.densities, densities, walls.periodic)
             self.seconds.simulate += simulated - began
             self.seconds.lookup += clock() - simulated
             yield Frame(

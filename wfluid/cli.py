@@ -61,6 +61,17 @@ class Version(argparse.Action):
         parser.exit()
 
 
+class Keys(argparse.Action):
+    """Prints the keys of a scene file."""
+
+    def __call__(self, parser, *_) -> NoReturn:
+        """Load the schema only now, when it is asked for."""
+        from wfluid.scene_format import reference
+
+        print(reference(), end="")
+        parser.exit()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; returns the exit code."""
     options = _parser().parse_args(arguments)
@@ -137,6 +148,7 @@ def _parser() -> Parser:
     )
     render.set_defaults(run=run_render)
     render.add_argument("scene", metavar="SCENE.toml", help="the scene")
+    render.add_argument("--keys", action=Keys, nargs=0, help="print every key of a scene, as Markdown")
     render.add_argument("-o", "--output", **_repeated("OUT", "write the picture here instead"))
     render.add_argument(
         "--set", **_repeated("KEY=VALUE", "change a value, such as time.duration=1 or force.nose.radius=40")

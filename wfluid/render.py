@@ -13,11 +13,12 @@ from typing import Protocol
 import numpy as np
 
 from wfluid.animation import Animation, Frame
+from wfluid.composite import stretched
 from wfluid.device import kernels_are_built, open_device
 from wfluid.estimate import check_memory, estimate
 from wfluid.files import readable_size
 from wfluid.output import check_folder, names, open_output
-from wfluid.picture import Picture, resample, write_picture
+from wfluid.picture import Picture, write_picture
 from wfluid.preview import draw_controls
 from wfluid.report import Report, write_report
 from wfluid.scene import Output, Scene, write_scene
@@ -147,8 +148,8 @@ def _shown(frame: Frame, of: str) -> Picture:
     if of in frame.layers:
         return frame.layers[of]
     width, height = frame.picture.width, frame.picture.height
-    values = resample(frame.densities[of].astype(np.float32), width, height, filter="bspline")
-    return Picture(np.maximum(values, 0.0)[..., None], dtype="float", data=True)
+    values = stretched(np.maximum(frame.densities[of], 0.0), width, height, frame.map.walls.periodic)
+    return Picture(values[..., None], dtype="float", data=True)
 
 
 def _say_plan(animation: Animation, outputs: Sequence[Output]) -> None:
