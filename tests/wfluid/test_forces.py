@@ -236,6 +236,22 @@ def test_growth_keeps_the_area_of_the_whole(make_solver):
     assert np.abs(d_x[:, [0, 1, -2, -1]]).max() < 1e-5
 
 
+def test_growth_beside_something_stiff_converges_with_the_step(make_solver):
+    """First order in dt: a quarter of the step leaves at most 0.4 of the error.
+
+    The pressure of a growth is of its step alone; kept for the next it would push on.
+    """
+    x = (np.arange(48) + 0.5) / 48
+    stiff = 0.001 + (np.hypot(x - 0.62, x[:, None] - 0.5) < 0.12)
+    growth = Growth((0.45, 0.5), 2.0, 0.08, Oscillator(period=0.25, phase=0.0, centred=False))
+    ends = []
+    for steps in (24, 96, 384):
+        solver = make_solver(48, 48, stretch=1, viscosity=stiff)
+        ends.append(np.stack(run(solver, [growth], steps, 0.5 / steps).displacement))
+    coarse, fine = (np.abs(end - ends[-1]).max() for end in ends[:-1])
+    assert fine < 0.4 * coarse, (coarse, fine)
+
+
 def test_wind_between_walls_moves_nothing_and_weighted_or_wrapped_it_does(make_solver):
     """The pressure balances a uniform force in a closed box; the largest speed of three cases."""
 
