@@ -47,16 +47,16 @@ def swell(
     pitch_x: int,
     pitch_y: int,
     # outputs
-    b: Field,
+    s: Field,
 ):
-    """Add the divergence [1/s] of source n at centre k to b = -div v, in place."""
+    """Add the divergence [1/s] of source n at centre k, in place."""
     k = inside(k)
     column = in_profile(n, i, pitch_x)
     row = in_profile(n, j, pitch_y)
     x = gather(r_x, column)
     y = gather(r_y, row)
     g = gather(centre_x, column) * gather(centre_y, row)
-    b[k] = b[k] + gather(rate, n) * (Real(1.0) - Real(0.5) * (x * x + y * y)) * g
+    s[k] = s[k] + gather(rate, n) * (Real(1.0) - Real(0.5) * (x * x + y * y)) * g
 
 
 @cells
@@ -71,6 +71,35 @@ def lower(
     """Take a number off b, in place: a mean that should not be there."""
     k = inside(k)
     b[k] = b[k] - by
+
+
+@cells
+def weigh(
+    i: int,
+    j: int,
+    k: int,
+    weight: Field,
+    # outputs
+    s: Field,
+):
+    """Multiply the divergence at centre k by a weight, in place."""
+    k = inside(k)
+    s[k] = s[k] * weight[k]
+
+
+@cells
+def add_balanced(
+    i: int,
+    j: int,
+    k: int,
+    s: Field,
+    mean: Uniform,
+    # outputs
+    b: Field,
+):
+    """Add the divergence s less its mean, for which closed walls have no place, to b = -div v, in place."""
+    k = inside(k)
+    b[k] = b[k] + (s[k] - mean)
 
 
 @cells

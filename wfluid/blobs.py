@@ -51,17 +51,6 @@ class Blobs:
         boxes[~np.any(table[3:], axis=0)] = 0
         return boxes
 
-    def swell_mean(self, blobs: Sequence[Blob]) -> float:
-        """Mean over the grid of the divergence that they prescribe [1/s]."""
-        total = 0.0
-        for blob in blobs:
-            (x, xx), (y, yy) = (
-                axis.sums(center, blob.radius)
-                for axis, center in zip((self._x, self._y), blob.center, strict=True)
-            )
-            total += blob.swell * (x * y - 0.5 * (xx * y + x * yy))
-        return total / (self.grid.nx * self.grid.ny)
-
     def push(self, velocity: Vector) -> None:
         """Add their pushes and turns to the velocity, in place: launches only."""
         x, y = self._x, self._y
@@ -78,11 +67,11 @@ class Blobs:
         ]
         forces.push.launch(self.layout, self.device, inputs, velocity, boxes=self._boxes)
 
-    def swell(self, b: wp.array) -> None:
-        """Add the divergence they prescribe to b = -div v, in place: launches only."""
+    def swell(self, s: wp.array) -> None:
+        """Add the divergence they prescribe to a field, in place: launches only."""
         (r_x, g_x), (r_y, g_y) = self._profile()
         inputs = [self._strengths[3], g_x, g_y, r_x, r_y, self._x.layout.pitch, self._y.layout.pitch]
-        sources.swell.launch(self.layout, self.device, inputs, [b], boxes=self._boxes)
+        sources.swell.launch(self.layout, self.device, inputs, [s], boxes=self._boxes)
 
     def pour(self, rho: wp.array) -> None:
         """Add their amounts to a density, in place: launches only."""
@@ -106,10 +95,3 @@ class _Axis:
         self.center, self.points, self.h, self.period = center, points, h, period
         self.layout = Layout(points, len(center))
         self.on_faces, self.at_centres = (vector(self.layout, center.device, 2) for _ in range(2))
-
-    def sums(self, center: float, radius: float) -> tuple[float, float]:
-        """Sums over the centres of g and of r^2 g."""
-        d = (np.arange(self.points) + 0.5) * self.h - center
-        r = (d - self.period * np.round(d / self.period) if self.period else d) / radius
-        g = np.where(np.abs(r) < float(forces.CUT), np.exp(-0.5 * r * r), 0.0)
-        return float(g.sum()), float((r * r * g).sum())

@@ -195,7 +195,7 @@ def _drawn(parser: argparse.ArgumentParser) -> None:
             "a force from a picture or self; keys also along (gradient, contour, vectors), amount [px]",
         ),
     )
-    pours = "keys radius, amount, diffusion, lift [px], start, end, at, period"
+    pours = "keys radius, amount, diffusion, lift [px], start, end, at, rise, fall"
     add("--ink", **_repeated("X,Y:#RRGGBB[:…]", f"pour ink of a colour; {pours}"))
     add("--smoke", **_repeated("X,Y:#RRGGBB[:…]", f"pour smoke of a colour; {pours}"))
     add("--viscosity", type=float, help="viscosity [longer side^2/s] (0.001); of white, with an image (0.1)")

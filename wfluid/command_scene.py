@@ -8,7 +8,7 @@ from typing import Any
 
 from wfluid.output import numbering
 from wfluid.scene import Scene
-from wfluid.scene_format import COURSE, FORCES, VERSION
+from wfluid.scene_format import FORCES, VERSION
 from wfluid.schema import SchemaError, checked
 
 FORMS = {
@@ -63,9 +63,9 @@ _FLAGS = {
 _DENSITY_KEYS = ("diffusion", "lift")
 """Keys of a poured density that are not its source's."""
 
-_SOURCE_KEYS = ("radius", "amount", *(key for key in COURSE if key != "envelope"))
+_SOURCE_KEYS = ("radius", "amount", "start", "end", "at", "rise", "fall", "strength")
 
-_UNWRITTEN = ("path", "envelope", "points")
+_UNWRITTEN = ("path", "envelope", "points", "name", "group")
 """Keys that have no short form."""
 
 
@@ -143,7 +143,7 @@ def _options(what: str, text: str, keys: list[str]) -> dict[str, Any]:
 
 
 def _option(what: str, key: str, value: str) -> Any:
-    if key in ("name", "group", "mask", "along"):
+    if key in ("mask", "along"):
         return value
     return int(value) if key == "seed" and value.isdecimal() else _number(what, key, value)
 
@@ -195,8 +195,11 @@ def scene_of(options: argparse.Namespace) -> Scene:
             density, lift = parse_density(look, text, f"{look} {len(tables['density']) + 1}")
             flags["density", len(tables["density"])] = f"--{look} {text}"
             tables["density"].append(density)
-            tables["force"] += [lift] if lift else []
+            if lift:
+                flags["force", len(tables["force"])] = f"--{look} {text}"
+                tables["force"].append(lift)
     tables["layer"] = [{"name": _layer_name(file), "file": file} for file in options.layer]
+    flags |= {("layer", n): f"--layer {file}" for n, file in enumerate(options.layer)}
     if options.track:
         tables["tracks"] = {
             "points": [_pair(f"track {text!r}", "the point X,Y", text) for text in options.track]
@@ -251,8 +254,8 @@ def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
     for flag in ("tracks", "report"):
         if getattr(options, flag) is not None:
             found.append({"file": getattr(options, flag), "of": flag})
-    if options.track and options.tracks is None:
-        raise ValueError("--track: where to? give --tracks FILE.csv")
+    if bool(options.track) != (options.tracks is not None):
+        raise ValueError("--track X,Y and --tracks FILE.csv go together")
     return found
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import warp as wp
 
 from wfluid.blobs import Blobs
-from wfluid.forces import FORCE_LIMIT, Blob, BlobForce, Buoyancy, FieldForce, Force, Growth
+from wfluid.forces import FORCE_LIMIT, STEP_GROWTH, BlobForce, Buoyancy, FieldForce, Force, Growth
 from wfluid.grid import Grid
 from wfluid.kernels import forces as kernels
-from wfluid.kernels import sources
+from wfluid.kernels import krylov, sources
 from wfluid.kernels.cells import Layout, Real
 from wfluid.kernels.strips import alone
 from wfluid.painted import Painted
@@ -21,8 +21,8 @@ from wfluid.walls import Ghosts, Walls
 STEP_LIMIT = 10.0
 """Longest step the solver is tested with [s]."""
 
-_STEP = 6
-"""Numbers of the step itself: dt / h and kept / h along both axes, kept, mean divergence."""
+_STEP = 5
+"""Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
 
 
 class Controls:
@@ -36,11 +36,9 @@ class Controls:
     ):
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
         self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
-        self._pushes = [
-            _Push(weight, numbers, grid, walls, device) for weight, numbers in _by_weight(self._forces)
-        ]
-        self._growths = [n for n, force in enumerate(forces) if isinstance(force, Growth)]
-        self._swelling = Blobs(len(self._growths), grid, walls, device) if self._growths else None
+        pushes, growths = _by_weight(self._forces)
+        self._pushes = [_Push(*group, grid, walls, device) for group in pushes]
+        self._growths = [_Growing(*group, grid, walls, device) for group in growths]
         self._fields: list[tuple[int, Vector]] = []
         self._lifts: list[tuple[int, int]] = []
         for n, force in enumerate(forces):
@@ -51,15 +49,13 @@ class Controls:
         count = _STEP + len(self._fields) + 2 * len(self._lifts)
         self._numbers = wp.zeros(count, dtype=Real, device=device)
         numbers = [self._numbers[n : n + 1] for n in range(count)]
-        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept, self._mean = numbers[:_STEP]
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = numbers[:_STEP]
         self._field_impulses = numbers[_STEP : _STEP + len(self._fields)]
         self._lift_impulses = numbers[_STEP + len(self._fields) :]
-        self.prescribed = self.removed = 0.0
+        self.prescribed = 0.0
 
     prescribed: float
-    """Sum of the largest divergences that the last step's sources prescribe [1/s]."""
-    removed: float
-    """The part of it that has no place between the walls: its mean, taken off everywhere [1/s]."""
+    """Sum of the largest divergences that the last step's growths prescribe [1/s]."""
 
     @staticmethod
     def key(forces: Sequence[Force]) -> tuple:
@@ -76,7 +72,12 @@ class Controls:
     @property
     def swells(self) -> bool:
         """Whether any force prescribes divergence."""
-        return self._swelling is not None
+        return bool(self._growths)
+
+    @property
+    def removed(self) -> float:
+        """Of the divergence prescribed, what had no place: its mean, taken off everywhere [1/s]."""
+        return float(sum(growing.mean.numpy()[0] for growing in self._growths))
 
     def set(self, forces: Sequence[Force], t: float, dt: float, until: float, kept: float = 0.0) -> None:
         """Put a step of dt, in which forces act from t to `until`, on the device.
@@ -88,19 +89,18 @@ class Controls:
         """
         blobs = {n: force.over(t, until) for n, force in enumerate(forces) if isinstance(force, BlobForce)}
         for blob in blobs.values():
+            if abs(blob.swell) * dt > STEP_GROWTH:
+                raise ValueError(
+                    f"the growth at {blob.center} would change areas by exp({blob.swell * dt:.3g}) in a step "
+                    f"of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer window help"
+                )
             gained = max(blob.gained, abs(blob.swell) * blob.radius)
             _check(f"the force at {blob.center}", gained, t, until)
-        for push in self._pushes:
-            push.blobs.set([blobs[n] for n in push.members])
+        for group in (*self._pushes, *self._growths):
+            group.blobs.set([blobs[n] for n in group.members])
+        self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
         hx, hy = self.grid.hx, self.grid.hy
-        numbers = [
-            dt / hx,
-            dt / hy,
-            kept / hx,
-            kept / hy,
-            kept,
-            self._swell([blobs[n] for n in self._growths]),
-        ]
+        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
         integrals: dict[int, list[float]] = {}
         for n, _ in self._fields:
             if n not in integrals:
@@ -113,17 +113,6 @@ class Controls:
             _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
             numbers += [impulse * component for component in forces[n].vector]
         self._numbers.assign(np.array(numbers))
-
-    def _swell(self, blobs: Sequence[Blob]) -> float:
-        """Put the growths on the device; the mean of the divergence they prescribe [1/s]."""
-        if not self._swelling:
-            return 0.0
-        self._swelling.set(blobs)
-        self.prescribed, self.removed = (
-            sum(abs(blob.swell) for blob in blobs),
-            self._swelling.swell_mean(blobs),
-        )
-        return self.removed
 
     def push(self, state: State, out: Vector) -> None:
         """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
@@ -142,8 +131,8 @@ class Controls:
 
     def prescribe(self, b: wp.array) -> None:
         """Add the divergence that is to stay to b = -div v, in place: launches only."""
-        self._swelling.swell(b)
-        sources.lower.launch(self.layout, self.device, [self._mean], [b])
+        for growing in self._growths:
+            growing.add(b)
 
 
 class _Push:
@@ -152,18 +141,14 @@ class _Push:
     def __init__(
         self, weight: Painted | None, members: list[int], grid: Grid, walls: Walls, device: wp.Device
     ):
-        self.members, self.weight, self.device = members, weight, device
-        self.layout = Layout(grid.nx, grid.ny)
+        self.members, self.device, self.layout = members, device, Layout(grid.nx, grid.ny)
         self.blobs = Blobs(len(members), grid, walls, device)
-        if weight is not None:
-            self._weights = field(self.layout, device)
-            from_numpy(weight.on(grid), self._weights, self.layout)
-            Ghosts(self.layout, walls.centre_rules(), device).fill(self._weights)
-            self._gained = vector(self.layout, device, 2)
+        self._weights = _weights(weight, grid, walls, device)
+        self._gained = vector(self.layout, device, 2) if weight is not None else ()
 
     def add(self, velocity: Vector) -> None:
         """Add what they gain to the velocity, in place: launches only."""
-        if self.weight is None:
+        if not self._gained:
             self.blobs.push(velocity)
             return
         gained = self._gained
@@ -173,13 +158,57 @@ class _Push:
             kernels.push_weighted.launch(self.layout, self.device, [f, self._weights, before], [component])
 
 
-def _by_weight(forces: Sequence[Force]) -> list[tuple[Painted | None, list[int]]]:
-    """The weights of Gaussian pushes, each with the numbers of its forces."""
-    found: dict[int, tuple[Painted | None, list[int]]] = {}
+class _Growing:
+    """Growths with one weight: their divergence is a field first, of which the mean is taken off."""
+
+    def __init__(
+        self, weight: Painted | None, members: list[int], grid: Grid, walls: Walls, device: wp.Device
+    ):
+        self.members, self.device, self.layout = members, device, Layout(grid.nx, grid.ny)
+        self.blobs = Blobs(len(members), grid, walls, device)
+        self._weights = _weights(weight, grid, walls, device)
+        self._swell = field(self.layout, device)
+        self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=device)
+        self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
+        self.mean = wp.zeros(1, dtype=Real, device=device)
+
+    mean: wp.array
+    """What was taken off [1/s]."""
+
+    def add(self, b: wp.array) -> None:
+        """Add what they prescribe to b, in place: launches only."""
+        swell, (nx, ny), pitch = self._swell, (self.layout.nx, self.layout.ny), self.layout.pitch
+        alone(swell.zero_)
+        self.blobs.swell(swell)
+        if self._weights is not None:
+            sources.weigh.launch(self.layout, self.device, [self._weights], [swell])
+        krylov.row_products.launch(ny, self.device, [swell, self._ones, nx, pitch, 0], [self._rows])
+        krylov.mean_of.launch(1, self.device, [self._rows, ny, nx * ny], [self.mean])
+        sources.add_balanced.launch(self.layout, self.device, [swell, self.mean], [b])
+
+
+def _weights(weight: Painted | None, grid: Grid, walls: Walls, device: wp.Device) -> wp.array | None:
+    """A weight at centres, with ghosts."""
+    if weight is None:
+        return None
+    layout = Layout(grid.nx, grid.ny)
+    weights = field(layout, device)
+    from_numpy(weight.on(grid), weights, layout)
+    Ghosts(layout, walls.centre_rules(), device).fill(weights)
+    return weights
+
+
+_Groups = list[tuple[Painted | None, list[int]]]
+
+
+def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
+    """The weights of Gaussian pushes, and of growths, each with the numbers of its forces."""
+    found: tuple[dict, dict] = {}, {}
     for n, force in enumerate(forces):
-        if isinstance(force, BlobForce) and not isinstance(force, Growth):
-            found.setdefault(id(force.weight), (force.weight, []))[1].append(n)
-    return list(found.values())
+        if isinstance(force, BlobForce):
+            groups = found[isinstance(force, Growth)]
+            groups.setdefault(id(force.weight), (force.weight, []))[1].append(n)
+    return list(found[0].values()), list(found[1].values())
 
 
 def _index_of(name: str, densities: Sequence[str]) -> int:

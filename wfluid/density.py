@@ -5,16 +5,18 @@ d rho / dt = -(v . grad) rho + kappa Lap rho + S
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from wfluid.envelopes import Constant, Envelope, finite
-from wfluid.forces import Blob
+from wfluid.forces import Blob, check_radius
 from wfluid.painted import VISCOSITY_LIMIT, Painted
 from wfluid.paths import Center, as_center, place_at
 
 LOOKS = ("ink", "smoke")
+
+RATE_LIMIT = 1e6
+"""Most that a source may pour [1/s]."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,9 @@ class Source:
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Source.center", self.center))
         finite("Source.rate", self.rate)
-        if not (math.isfinite(self.radius) and self.radius > 0):
-            raise ValueError(f"Source.radius {self.radius}: expected a positive number")
+        if not abs(self.rate) <= RATE_LIMIT:
+            raise ValueError(f"Source.rate {self.rate:g}: the limit is {RATE_LIMIT:g}/s")
+        check_radius("Source.radius", self.radius)
 
     def over(self, start: float, end: float) -> Blob:
         """What it pours from `start` to `end` [s]."""

@@ -11,24 +11,29 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from wfluid.courses import course, window
 from wfluid.envelopes import Arbitrary, Constant, Envelope, Fade, Oscillator, product
 from wfluid.forces import Buoyancy, Force, GaussianForce, Growth, Stroke, VortexForce, Wind
+from wfluid.image_force import DEFAULT_RADIUS as DEFAULT_BLUR
 from wfluid.image_force import ImageForce
 from wfluid.noise_force import NoiseForce
-from wfluid.painted import Painted
+from wfluid.painted import Freeze, Painted
+from wfluid.paintings import Paintings, named
 from wfluid.paths import Center, Path
-
-if TYPE_CHECKING:
-    from wfluid.paintings import Paintings
+from wfluid.picture import resample
 
 DEFAULT_RADIUS = 0.06
 """Radius of a force that names none [longer side]."""
 
 DEFAULT_SCALE = 0.2
 """Mean wavelength of noise that names none [longer side]."""
+
+DEFAULT_LENGTH = 0.02
+"""How far a painted force carries its strongest place where it does not say it [longer side]."""
 
 _PRESSURE = 2.0
 
@@ -56,6 +61,8 @@ class Drawing:
     """Of noise that names none."""
     weight: Painted | None = None
     """Where forces act that name no mask."""
+    frozen: Freeze | None = None
+    """What stays where it is: no growth acts there."""
     paintings: Paintings | None = None
     """Reads the pictures that forces name."""
 
@@ -169,17 +176,30 @@ class Drawing:
             start, end = window("grow", table, self.duration)
             wave = Oscillator(period=period, phase=phase, start=start, end=end, centred=False)
             rate, envelope = area * 2 * math.pi / period, wave * _fade(table, start, end)
-        elif "at" in table:
-            rate = area
         else:
             rate = area / envelope.integral(0.0, self.duration)
-        return Growth(center, rate, self.radius(table), self.modulated("grow", envelope, table))
+        envelope = self.modulated("grow", envelope, table)
+        return Growth(center, rate, self.radius(table), envelope, self._unfrozen(self._mask(table)))
+
+    def _unfrozen(self, weight: Painted | None) -> Painted | None:
+        """A weight without what is frozen."""
+        if self.frozen is None:
+            return weight
+        free = 1.0 - self.frozen.paint.values
+        if weight is None:
+            return Painted(free)
+        height, width = weight.values.shape
+        return Painted(weight.values * resample(free.astype(np.float32), width, height).clip(0, 1))
 
     def _stroke(self, table: Mapping[str, Any]) -> Stroke:
         if ("points" in table) == ("path" in table):
             raise ValueError("stroke: expected either points or path")
         if "path" in table:
+            if table.keys() & {"start", "end"}:
+                raise ValueError("stroke: a path has its own times; it goes without start and end")
             path = self._path("stroke", table["path"])
+            if path.times[0] >= self.duration:
+                raise ValueError(f"stroke: its path begins at {path.times[0]:g} s, after the animation")
         else:
             points = [self.place("stroke", at) for at in table["points"]]
             path = Path.along(points, *window("stroke", table, self.duration))
@@ -202,8 +222,22 @@ class Drawing:
         )
 
     def _image(self, table: Mapping[str, Any]) -> ImageForce:
-        """From a picture; see `Paintings.force`."""
-        return self.paintings.force(table, self, self._mask(table))
+        name, kind, paintings = table["file"], table.get("along", "gradient"), self.paintings
+        weight = self._mask(table)
+        envelope, per_length = self.course(f"force image {name}", table)
+        length = table["amount"] / self.side if "amount" in table else DEFAULT_LENGTH
+        radius = table["radius"] / self.side if "radius" in table else DEFAULT_BLUR
+        read = paintings.read if kind == "vectors" else paintings.paint
+        force = named(
+            name,
+            lambda: ImageForce(read(name), kind, length * per_length, envelope, weight, radius),
+        )
+        if kind == "gradient" and weight is None:
+            paintings.note(
+                f"{name}: the pressure balances a gradient wholly, so alone it moves nothing; "
+                "use along=contour, or give it a mask"
+            )
+        return force
 
     def _buoyancy(self, table: Mapping[str, Any]) -> Buoyancy:
         envelope, per_length = self.course("buoyancy", table)

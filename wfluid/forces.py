@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wfluid.envelopes import Constant, Envelope, finite, product
+from wfluid.envelopes import Constant, Envelope, Instantaneous, finite, product
 from wfluid.grid import Grid
 from wfluid.painted import Painted
 from wfluid.paths import Center, Path, Place, as_center, place, place_at
@@ -26,6 +26,12 @@ FORCE_LIMIT = 1e4
 
 RATE_LIMIT = 100.0
 """Largest prescribed divergence the solver is tested with [1/s]."""
+
+STEP_GROWTH = 0.5
+"""Most that a step may grow or shrink: logarithm of the area."""
+
+LEAST_RADIUS, MOST_RADIUS = 1e-6, 1e3
+"""Radii that single precision holds [longer side]."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +122,7 @@ class GaussianForce(BlobForce):
         object.__setattr__(self, "center", as_center("GaussianForce.center", self.center))
         object.__setattr__(self, "vector", place("GaussianForce.vector", self.vector))
         _limited("force", math.hypot(*self.vector))
-        _positive("GaussianForce.radius", self.radius)
+        check_radius("GaussianForce.radius", self.radius)
 
     def over(self, start: float, end: float) -> Blob:
         """The vector times the envelope's integral."""
@@ -149,7 +155,7 @@ class VortexForce(BlobForce):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("VortexForce.center", self.center))
-        _positive("VortexForce.radius", self.radius)
+        check_radius("VortexForce.radius", self.radius)
         finite("VortexForce.spin", self.spin)
         _limited("vortex", abs(self.spin) * self.radius)
 
@@ -167,7 +173,9 @@ class Growth(BlobForce):
     takes, their integrals cancel, and the velocity that belongs to it in free space is
     rate / 2 (x - center) exp(-r^2 / 2): the center stays, and areas there grow by exp of the integral of
     rate times envelope. Where walls cut the ring the mean over the picture is taken off. Areas are not
-    preserved. A step prescribes the mean over its length, so that the integral is exact whatever the step.
+    preserved. A step prescribes the mean over its length, which carries the picture in the next step: the
+    whole is exact whatever the step, once a step has passed after its end. What is frozen grows too; give
+    a `weight` that spares it.
 
     Raises:
         ValueError: as `GaussianForce`; a rate beyond 100/s.
@@ -176,21 +184,27 @@ class Growth(BlobForce):
     center: Center
     """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
     rate: float
-    """Divergence at the center [1/s]; for `Instantaneous` the logarithm of the area's growth."""
+    """Divergence at the center [1/s]."""
     radius: float
     """Sigma of the Gaussian [longer side]."""
     envelope: Envelope = field(default_factory=Constant)
     """Course in time."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture; the mean of what is left is taken off."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Growth.center", self.center))
-        _positive("Growth.radius", self.radius)
+        check_radius("Growth.radius", self.radius)
         if not abs(self.rate) <= RATE_LIMIT:
             raise ValueError(f"growth of {self.rate:g}/s: the limit is {RATE_LIMIT:g}/s")
+        if isinstance(self.envelope, Instantaneous):
+            raise ValueError("a growth takes time: give it a window instead of an instant")
 
     def over(self, start: float, end: float) -> Blob:
         """The rate's mean over the step."""
-        mean = self.rate * self.envelope.integral(start, end) / (end - start) if end > start else 0.0
+        length = end - start
+        course = self.envelope.integral(start, end) / length if length > 0 else self.envelope.value(start)
+        mean = self.rate * course
         return Blob(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
 
 
@@ -219,7 +233,7 @@ class Stroke(BlobForce):
     def __post_init__(self) -> None:
         if not isinstance(self.path, Path):
             raise TypeError(f"Stroke.path: expected a Path, got {type(self.path).__name__}")
-        _positive("Stroke.radius", self.radius)
+        check_radius("Stroke.radius", self.radius)
         finite("Stroke.strength", self.strength)
         _limited("stroke", max(math.hypot(*push) for _, _, push in self._pieces()))
 
@@ -367,6 +381,11 @@ def _limited(what: str, acceleration: float) -> None:
         raise ValueError(f"{what} of {acceleration:g}: the limit is {FORCE_LIMIT:g} longer sides/s^2")
 
 
-def _positive(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name} {value}: expected a positive number")
+def check_radius(name: str, value: float) -> None:
+    """Refuse a radius that is none.
+
+    Raises:
+        ValueError: outside 1e-6 … 1e3 longer sides.
+    """
+    if not LEAST_RADIUS <= value <= MOST_RADIUS:
+        raise ValueError(f"{name} {value}: expected {LEAST_RADIUS:g} … {MOST_RADIUS:g} longer sides")

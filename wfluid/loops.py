@@ -158,7 +158,11 @@ def _oscillating(runner: Runner, forces: Sequence[Force], frames: int, seam: Sea
         part, bend = n / frames, _bend(n, frames)
         weights = (1.0, part - bend, bend, bend - part, -bend)
         terms = zip(weights, (snapshot, first, second, last, after), strict=True)
-        yield Moment(Snapshot.sum_of(*terms).onto(runner.now), solve)
+        closed = Snapshot.sum_of(*terms)
+        s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
+        fade = s * s * (3 - 2 * s)  # densities do not swing: towards the end they flow into their beginning
+        poured = Snapshot.sum_of((1 - fade, snapshot), (fade, first))
+        yield Moment(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
 
 
 def _bend(n: int, frames: int) -> float:
@@ -199,34 +203,37 @@ def _fading(runner: Runner, forces: Sequence[Force], frames: int, _: Seam) -> It
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What of a state is seen: a copy of its map, its densities and its points."""
+    """What of a state is seen: a copy of its map, its points and its densities, ghosts included."""
 
-    arrays: tuple[np.ndarray, ...]
-    """The device arrays' contents, ghosts included."""
+    moved: tuple[np.ndarray, ...]
+    """Both components of the map and of the points."""
+    poured: tuple[np.ndarray, ...]
+    """The densities."""
 
     @classmethod
     def of(cls, state: State) -> Snapshot:
         """A copy of what a state shows."""
-        return cls(tuple(array.numpy().copy() for array in _seen(state)))
+        return cls(*(tuple(array.numpy().copy() for array in arrays) for arrays in _seen(state)))
 
     @classmethod
     def sum_of(cls, *terms: tuple[float, Snapshot]) -> Snapshot:
         """A sum of snapshots, each times its weight."""
-        weights, snapshots = zip(*terms, strict=True)
-        columns = zip(*(snapshot.arrays for snapshot in snapshots), strict=True)
-        return cls(
-            tuple(
-                sum(array.dtype.type(weight) * array for weight, array in zip(weights, arrays, strict=True))
-                for arrays in columns
-            )
-        )
+
+        def summed(*arrays: np.ndarray) -> np.ndarray:
+            weights = (array.dtype.type(weight) for (weight, _), array in zip(terms, arrays, strict=True))
+            return sum(weight * array for weight, array in zip(weights, arrays, strict=True))
+
+        moved = zip(*(snapshot.moved for _, snapshot in terms), strict=True)
+        poured = zip(*(snapshot.poured for _, snapshot in terms), strict=True)
+        return cls(tuple(summed(*arrays) for arrays in moved), tuple(summed(*arrays) for arrays in poured))
 
     def onto(self, state: State) -> State:
         """Write it over what a state shows; returns the state."""
-        for values, array in zip(self.arrays, _seen(state), strict=True):
-            array.assign(values)
+        for values, arrays in zip((self.moved, self.poured), _seen(state), strict=True):
+            for value, array in zip(values, arrays, strict=True):
+                array.assign(value)
         return state
 
 
-def _seen(state: State) -> tuple:
-    return state.d_x, state.d_y, *state.rho, state.p_x, state.p_y
+def _seen(state: State) -> tuple[tuple, tuple]:
+    return (state.d_x, state.d_y, state.p_x, state.p_y), state.rho

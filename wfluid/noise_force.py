@@ -56,8 +56,8 @@ class NoiseForce(FieldForce):
             raise ValueError(
                 f"NoiseForce: strength {self.strength}: expected at most {FORCE_LIMIT / _PEAK:g}"
             )
-        if not 0.001 <= self.scale <= 10:
-            raise ValueError(f"NoiseForce: scale {self.scale}: expected 0.001 … 10")
+        if not 0.001 <= self.scale <= 2:
+            raise ValueError(f"NoiseForce: scale {self.scale}: expected 0.001 … 2 longer sides")
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
             raise ValueError(f"NoiseForce: seed {self.seed!r}: expected a whole number from 0 on")
         if self.period is not None and not (math.isfinite(self.period) and self.period > 0):
@@ -91,13 +91,17 @@ def _waves(random: np.random.Generator, scale: float, grid: Grid, walls: Walls) 
     """A stream function at the nodes, (ny + 1, nx + 1), whose gradient has a root mean square of 1."""
     angle, phase = random.uniform(0, 2 * math.pi, (2, MODES))
     number = 2 * math.pi / scale * random.uniform(1 - _SPREAD, 1 + _SPREAD, MODES)
-    wave = [number * np.cos(angle), number * np.sin(angle)]
-    for axis, (length, periodic) in enumerate(zip((grid.width, grid.height), walls.periodic, strict=True)):
+    wave = np.stack([number * np.cos(angle), number * np.sin(angle)])
+    lengths, longest = (grid.width, grid.height), scale
+    for axis, (length, periodic) in enumerate(zip(lengths, walls.periodic, strict=True)):
         if periodic:
             wave[axis] = np.round(wave[axis] * length / (2 * math.pi)) * (2 * math.pi / length)
-    number = np.hypot(*wave)
-    used = number > 0  # rounded to nothing where both axes wrap and the scale is longer than they
-    amplitude = np.where(used, math.sqrt(2 / max(1, used.sum())) / np.where(used, number, 1), 0.0)
+        else:
+            longest = min(longest, 2 * length)  # no eddy is longer than the picture between walls
+    still = ~wave.any(axis=0)  # rounded to nothing: one wave along an axis that wraps
+    wave[int(not walls.periodic[0]), still] = 2 * math.pi / lengths[int(not walls.periodic[0])]
+    # a wave that rounding or the draw made longer is not made steeper for it
+    amplitude = math.sqrt(2 / MODES) / np.maximum(np.hypot(*wave), (1 - _SPREAD) * 2 * math.pi / longest)
     x, y = (np.arange(n + 1) * h for n, h in ((grid.nx, grid.hx), (grid.ny, grid.hy)))
     along_x = np.exp(1j * np.outer(x, wave[0]))
     along_y = amplitude * np.exp(1j * (np.outer(y, wave[1]) + phase))

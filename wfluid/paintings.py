@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from wfluid.drawing import Drawing
-from wfluid.image_force import DEFAULT_RADIUS, ImageForce
 from wfluid.painted import DEFAULT_STRENGTH, Freeze, Keyed, Painted, Quantity
 from wfluid.picture import Picture, read_picture
 
@@ -24,9 +22,6 @@ DEFAULT_VISCOSITY = 0.001
 DEFAULT_PAINTED_VISCOSITY = 0.1
 """Viscosity of a white place where nothing says it: over 6 % of the longer side it stops a motion in
 1/30 s."""
-
-DEFAULT_LENGTH = 0.02
-"""How far a painted force carries its strongest place where it does not say it [longer side]."""
 
 _SAME_ASPECT = 0.01
 
@@ -71,12 +66,12 @@ class Paintings:
             ValueError: as `read`; a scale outside its range, keys that contradict.
         """
         if "key" in table:
+            keys = table["key"]
             if table.keys() & {"value", "image", "floor", "invert"}:
                 raise ValueError("viscosity: keys over time go without value, image, floor and invert")
-            keys = {
-                key["time"]: self.viscosity({k: key[k] for k in key if k != "time"}) for key in table["key"]
-            }
-            return Keyed(keys)
+            if len({key["time"] for key in keys}) < len(keys):
+                raise ValueError("viscosity: two keys have one time")
+            return Keyed({key["time"]: self.viscosity(key) for key in keys})
         if "image" not in table:
             for key in ("floor", "invert", "moves"):
                 if table.get(key):
@@ -84,7 +79,7 @@ class Paintings:
             return table.get("value", DEFAULT_VISCOSITY)
         name, invert = table["image"], table.get("invert", False)
         scale, floor = table.get("value", DEFAULT_PAINTED_VISCOSITY), table.get("floor", 0.0)
-        painted = _named(name, lambda: Painted(self.paint(name), scale, invert, floor))
+        painted = named(name, lambda: Painted(self.paint(name), scale, invert, floor))
         if painted.values.max() == 0:
             shade = "white" if invert else "black"
             self.note(f"{name}: {shade} all over, so the viscosity is 0 everywhere: an inviscid fluid")
@@ -98,7 +93,7 @@ class Paintings:
         """
         if name is None:
             return None
-        painted = _named(name, lambda: Painted(self.paint(name)))
+        painted = named(name, lambda: Painted(self.paint(name)))
         if painted.values.max() == 0:
             raise ValueError(f"{name}: black all over, so no force would act; paint white what should move")
         return painted
@@ -112,7 +107,7 @@ class Paintings:
         if not table:
             return None
         name, strength = table["mask"], table.get("strength", DEFAULT_STRENGTH)
-        frozen = _named(name, lambda: Freeze(self.paint(name), strength))
+        frozen = named(name, lambda: Freeze(self.paint(name), strength))
         if frozen.paint.values.max() == 0:
             self.note(f"{name}: black all over, so nothing is frozen")
         return frozen
@@ -123,29 +118,7 @@ class Paintings:
         Raises:
             ValueError: as `read`.
         """
-        return _named(name, lambda: Painted(self.paint(name), scale))
-
-    def force(self, table: Mapping[str, Any], drawing: Drawing, weight: Painted | None) -> ImageForce:
-        """The force of a picture.
-
-        Raises:
-            ValueError: as `read`; a window outside the animation.
-        """
-        name, kind, side = table["file"], table.get("along", "gradient"), drawing.side
-        envelope, per_length = drawing.course(f"force image {name}", table)
-        length = table["amount"] / side if "amount" in table else DEFAULT_LENGTH
-        radius = table["radius"] / side if "radius" in table else DEFAULT_RADIUS
-        read = self.read if kind == "vectors" else self.paint
-        force = _named(
-            name,
-            lambda: ImageForce(read(name), kind, length * per_length, envelope, weight, radius),
-        )
-        if kind == "gradient" and weight is None:
-            self.note(
-                f"{name}: the pressure balances a gradient wholly, so alone it moves nothing; "
-                "use along=contour, or give it a mask"
-            )
-        return force
+        return named(name, lambda: Painted(self.paint(name), scale))
 
     def layer(self, name: str, data: bool | None) -> Picture:
         """A further picture; one of a single channel is data where nothing says otherwise.
@@ -159,8 +132,12 @@ class Paintings:
         return read_picture(self.folder / name, "data") if data else picture
 
 
-def _named(name: str, make: Callable):
-    """What `make` makes; where it refuses, the file is named."""
+def named(name: str, make: Callable):
+    """What `make` makes; where it refuses, the file is named.
+
+    Raises:
+        ValueError: as `make`, with the file's name.
+    """
     try:
         return make()
     except ValueError as error:

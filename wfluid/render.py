@@ -65,7 +65,7 @@ def run_scene(scene: Scene, how: Run) -> int:
     tables = scene.tables
     if not any(tables.get(key) for key in ("force", "density")):
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
-    if not scene.outputs and not how.preview and not how.save_scene:
+    if not (scene.outputs or how.preview or how.save_scene or how.dry_run):
         raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
     _check_names(scene, how)
 
@@ -76,11 +76,11 @@ def run_scene(scene: Scene, how: Run) -> int:
     animation = stage(scene, how.device, note)
     check_memory(animation, _kept_frames(scene.outputs))
     writers = [] if how.preview or how.dry_run else _writers(scene, animation)
+    if how.save_scene:
+        write_scene(how.save_scene, _with_size(scene, animation.picture))
     if how.dry_run:
         _say_plan(animation, scene.outputs)
         return 0
-    if how.save_scene:
-        write_scene(how.save_scene, _with_size(scene, animation.picture))
     if how.preview:
         write_picture(how.preview, draw_controls(scene, animation))
     if how.preview or not scene.outputs:
@@ -108,6 +108,7 @@ def _check_names(scene: Scene, how: Run) -> None:
     frames = scene.timeline.frames
     taken = {path.resolve(): "a picture that is read" for path in scene.files()}
     taken[(scene.folder / scene.tables["picture"]["file"]).resolve()] = "the picture itself"
+    taken[Path(scene.source).resolve()] = "the scene itself"
     written = [(output.file, f"written as the {output.of}", output.start) for output in scene.outputs]
     for flag, name in (("--preview", how.preview), ("--save-scene", how.save_scene)):
         if name is not None:
@@ -118,6 +119,12 @@ def _check_names(scene: Scene, how: Run) -> None:
             if name in taken:
                 raise ValueError(f"{name}: that is {taken[name]}; write to another name")
             taken[name] = what
+    for path, ending, flag in (
+        *((output.file, ".json", "a report") for output in scene.outputs if output.of == "report"),
+        *([(Path(how.save_scene), ".toml", "a scene")] if how.save_scene else []),
+    ):
+        if path.suffix.lower() != ending:
+            raise ValueError(f"{path}: {flag} is written as {ending}")
 
 
 def _kept_frames(outputs: Sequence[Output]) -> int:

@@ -108,6 +108,8 @@ class Scene:
                 )
         for n, output in enumerate(tables.get("output", [])):
             _one_of(("output", n, "of"), output.get("of"), [*SHOWN, *layers, *densities])
+            if output.get("of") == "tracks" and not tables.get("tracks", {}).get("points"):
+                raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
 
     def with_values(self, settings: Sequence[str]) -> Scene:
         """The scene with some values set, each as "path=value"; the value is TOML, or else a text.
@@ -174,10 +176,13 @@ class Scene:
         """When frames are shown.
 
         Raises:
-            ValueError: a length or a rate outside its range.
+            SceneError: a length or a rate that makes no sense.
         """
         time = self.tables.get("time", {})
-        return Timeline(time.get("duration", 2.0), time.get("fps", 15.0), time.get("substeps"))
+        try:
+            return Timeline(time.get("duration", 2.0), time.get("fps", 15.0), time.get("substeps"))
+        except ValueError as error:
+            raise self.error(SchemaError(("time",), str(error))) from None
 
 
 def read_scene(path: str | os.PathLike) -> Scene:
@@ -188,7 +193,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"{path}: no such scene") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -246,7 +251,8 @@ def _copied(tables: Any) -> Any:
 def _value(text: str) -> Any:
     """A TOML value; what is none is a text."""
     try:
-        return tomlkit.parse(f"value = {text}").unwrap()["value"]
+        parsed = tomlkit.parse(f"value = {text}").unwrap()
+        return parsed["value"] if len(parsed) == 1 else text
     except TOMLKitError:
         return text
 

@@ -33,6 +33,9 @@ from wfluid.timeline import FPS_LIMIT, LEAST_FPS
 VERSION = 1
 """Of the format that this file describes."""
 
+AMOUNT_LIMIT = 1000.0
+"""Most density that a source may pour, or a picture paint."""
+
 LEAST_TIME = 0.001
 """Shortest period or window of a force [s]."""
 
@@ -107,11 +110,12 @@ FORCES = {
         },
     ),
     "grow": Table(
-        "Growing, or shrinking, with a ring around that gives way",
+        "Growing, or shrinking, with a ring around that gives way; not where it is frozen",
         {
             **_CENTER,
             "factor": Key("how many times as long the centre becomes", **number(0.05, 20), required=True),
-            **_FORCE,
+            **{name: key for name, key in _FORCE.items() if name != "at"},
+            **_MASK,
         },
     ),
     "stroke": Table(
@@ -134,8 +138,13 @@ FORCES = {
         "Turbulence: random eddies",
         {
             "amount": Key("how far it carries, root mean square", **number(), unit="px", required=True),
-            "scale": Key("mean wavelength", **number(above=0), unit="px", default="20 % of the longer side"),
-            "seed": Key("which noise", **whole(0, 2**32 - 1), default="the scene's seed"),
+            "scale": Key(
+                "mean wavelength, up to twice the longer side",
+                **number(above=0),
+                unit="px",
+                default="20 % of the longer side",
+            ),
+            "seed": Key("which noise", **whole(0, 2**32 - 1), default="the scene's, and the force's number"),
             "change": Key("time in which it changes and comes back", **number(LEAST_TIME), unit="s"),
             **_FORCE,
             **_MASK,
@@ -200,8 +209,12 @@ _SOURCE = Table(
     {
         **_CENTER,
         "image": _file("pours where this picture is bright, instead of a spot"),
-        "amount": Key("density poured in all, at the brightest place", **number(), default="1"),
-        **COURSE,
+        "amount": Key(
+            "density poured in all, at the brightest place",
+            **number(-AMOUNT_LIMIT, AMOUNT_LIMIT),
+            default="1",
+        ),
+        **{key: COURSE[key] for key in COURSE if key not in ("period", "phase")},
     },
 )
 
@@ -323,7 +336,7 @@ SCENE = Table(
                         default="0",
                     ),
                     "image": _file("there at the beginning where this picture is bright"),
-                    "amount": Key("density of the image's white", **number(0), default="1"),
+                    "amount": Key("density of the image's white", **number(0, AMOUNT_LIMIT), default="1"),
                     "source": Many(_SOURCE),
                 },
             ),

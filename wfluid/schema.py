@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
+
+LARGEST = sys.float_info.max
+"""Largest number: TOML's integers may be larger."""
 
 
 class SchemaError(ValueError):
@@ -93,7 +97,7 @@ def number(least: float = -math.inf, most: float = math.inf, above: float | None
     """The type of a finite number within a range; `above` excludes its lower end."""
 
     def check(value: Any) -> float:
-        wrong = isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value)
+        wrong = isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST
         if wrong or not least <= value <= most or (above is not None and value <= above):
             raise ValueError(f"expected {kind}")
         return value
@@ -120,8 +124,8 @@ def text() -> dict[str, Any]:
     """The type of a text that is not empty."""
 
     def check(value: Any) -> str:
-        if not isinstance(value, str) or not value.strip():
-            raise ValueError("expected a text")
+        if not isinstance(value, str) or not value.strip() or not value.isprintable():
+            raise ValueError("expected a text on one line")
         return value
 
     return {"check": check, "type": "a text"}
@@ -228,7 +232,7 @@ def _variant(what: Variants, value: Mapping, path: tuple) -> dict:
     kind = value.get("kind", what.default)
     if kind is None:
         raise SchemaError(path, f"kind is missing: expected one of {', '.join(what.tables)}")
-    if kind not in what.tables:
+    if not isinstance(kind, str) or kind not in what.tables:
         reason = f"{kind!r}: expected one of {', '.join(what.tables)}{nearest(kind, list(what.tables))}"
         raise SchemaError((*path, "kind"), reason)
     rest = {name: item for name, item in value.items() if name != "kind"}

@@ -176,8 +176,11 @@ class Solver:
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
         controls = self._controls_for(forces)
+        kept, swelled = self._kept(dt), self._last_controls and self._last_controls.prescribed
+        controls.set(forces, t, dt, until, kept)
+        if controls.prescribed or swelled:
+            controls.set(forces, t, dt, until, 0.0)
         self._last_controls = controls
-        controls.set(forces, t, dt, until, 0.0 if controls.swells else self._kept(dt))
         for density in self._densities:
             density.set(t, until)
         plan = self._plan(until, dt) + tuple(density.plan(dt) for density in self._densities)

@@ -10,11 +10,12 @@ import numpy as np
 
 from wfluid import colour
 from wfluid.animation import Animation
+from wfluid.courses import course
 from wfluid.density import Density, PaintedSource, Source
 from wfluid.drawing import Drawing
 from wfluid.envelopes import product
 from wfluid.fluid import Fluid
-from wfluid.forces import Force, Group
+from wfluid.forces import BlobForce, Force, Group
 from wfluid.paintings import Paintings
 from wfluid.picture import Picture, PictureError, read_picture
 from wfluid.scene import Scene
@@ -44,7 +45,7 @@ class _Stage:
     def __init__(self, scene: Scene, note: Callable[[str], None]):
         self.scene, self.tables, self.note = scene, scene.tables, note
         self._fluid()  # what is wrong without files is said before they are read
-        self.timeline = _at(("time",), lambda: scene.timeline)
+        self.timeline = scene.timeline
         self.loop = self.tables.get("time", {}).get("loop")
         picture = self.tables["picture"]
         self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
@@ -83,9 +84,10 @@ class _Stage:
         if min(width, height) <= 0:
             raise SchemaError(("picture", "size"), f"{width:g} x {height:g}: expected positive numbers")
         if abs(width / height * picture.height / picture.width - 1) > _SAME_ASPECT:
-            self.note(
-                f"the scene's pixels refer to {width:g} x {height:g}, the picture has "
-                f"{picture.width} x {picture.height}: its places are stretched"
+            raise SchemaError(
+                ("picture", "size"),
+                f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
+                f"{picture.width} x {picture.height} have another aspect",
             )
         settings = {
             "width": width,
@@ -105,6 +107,7 @@ class _Stage:
             envelopes=envelopes,
             seed=tables.get("seed", 0),
             weight=_at(("effect", "mask"), lambda: self.paintings.mask(mask)),
+            frozen=_at(("freeze",), lambda: self.paintings.freeze(tables.get("freeze"))),
             paintings=self.paintings,
         )
 
@@ -119,7 +122,7 @@ class _Stage:
         return self._fluid(
             viscosity=_at(("viscosity",), lambda: self.paintings.viscosity(viscosity)),
             viscosity_moves=viscosity.get("moves", False),
-            freeze=_at(("freeze",), lambda: self.paintings.freeze(self.tables.get("freeze"))),
+            freeze=self.drawing.frozen,
             densities=[
                 _at(("density", n), lambda table=table: self._density(table))
                 for n, table in enumerate(densities)
@@ -131,19 +134,19 @@ class _Stage:
         given = {key: table[key] for key in ("name", "look", "diffusion") if key in table}
         if "color" in table:
             given["color"] = linear_color(table["color"])
+        if "amount" in table and "image" not in table:
+            raise ValueError(f"{name}: amount is that of an image; a source has its own")
         if "image" in table:
             given["initial"] = self.paintings.amount(table["image"], table.get("amount", 1.0))
         sources = [self._source(f"a source of {name}", source) for source in table.get("source", [])]
         return Density(sources=sources, **given)
 
     def _source(self, what: str, table: Mapping[str, Any]) -> Source | PaintedSource:
-        """A source that pours its amount in all, over its course."""
+        """A source that pours its amount in all, over its window."""
         drawing = self.drawing
-        envelope, _ = drawing.course(what, table)
-        whole = abs(envelope.integral(0.0, drawing.duration))
-        if not whole:
-            raise ValueError(f"{what}: its envelope pours nothing in all")
-        rate = table.get("amount", 1.0) / whole
+        plain, _ = course(what, table, drawing.duration)
+        rate = table.get("amount", 1.0) / plain.integral(0.0, drawing.duration)
+        envelope = drawing.modulated(what, plain, table)
         if "image" not in table:
             return Source(drawing.center(what, table), rate, drawing.radius(table), envelope)
         if table.keys() & {"center", "path", "radius"}:
@@ -156,11 +159,24 @@ class _Stage:
         groups = self.tables.get("group", [])
         members: dict[str, list[Force]] = {group["name"]: [] for group in groups}
         for n, table in enumerate(self.tables.get("force", [])):
+            if table["kind"] == "noise":
+                table = {"seed": (self.tables.get("seed", 0) + n) % 2**32, **table}
             force = _at(("force", n), lambda table=table: self.drawing.force(table))
+            self._note_small(n, force)
             members.get(table.get("group"), found).append(force)
         for n, group in enumerate(groups):
             found.append(_at(("group", n), lambda group=group: self._group(group, members[group["name"]])))
         return found
+
+    def _note_small(self, n: int, force: Force) -> None:
+        """Say where a force is smaller than a cell, whose motion then depends on where in it it lies."""
+        cell = 1 / self.tables.get("fluid", {}).get("cells", 256)
+        if isinstance(force, BlobForce) and force.radius < cell:
+            side = self.drawing.side
+            self.note(
+                f"force.{n}: its radius of {force.radius * side:g} px is less than a cell of the fluid, "
+                f"{cell * side:.3g} px; use more cells"
+            )
 
     def _group(self, table: Mapping[str, Any], members: list[Force]) -> Group:
         name, strength = table["name"], table.get("strength", 1.0)

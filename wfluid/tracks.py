@@ -23,12 +23,13 @@ class Tracks:
         self.path, self._side = path, side
         self.written: list[Path] = []
         self._rows: list[str] = []
+        self._frames = 0
 
     def write(self, time: float, points: Sequence[tuple[float, float]] | np.ndarray) -> None:
         """Take the next frame's points [longer side]."""
-        frame = self._rows[-1].partition(",")[0] if self._rows else "-1"
         for n, (x, y) in enumerate(points):
-            self._rows.append(f"{int(frame) + 1},{time:.6g},{n},{x * self._side:.4f},{y * self._side:.4f}")
+            self._rows.append(f"{self._frames},{time:.6g},{n},{x * self._side:.4f},{y * self._side:.4f}")
+        self._frames += 1
 
     def close(self) -> None:
         """Write the file, if there are frames."""

@@ -236,6 +236,58 @@ def test_growth_keeps_the_area_of_the_whole(make_solver):
     assert np.abs(d_x[:, [0, 1, -2, -1]]).max() < 1e-5
 
 
+def test_a_weighted_growth_spares_what_the_weight_spares(make_solver):
+    """The prescribed divergence is the weighted one less its mean over the whole."""
+    grid = Grid(40, 40, 1.0, 1.0)
+    half = Painted(np.broadcast_to(np.arange(40) < 20, (40, 40)).astype(float))
+    solver = make_solver(40, 40, grid=grid, pressure_cycles=8)
+    state = run(solver, [Growth((0.5, 0.5), 2.0, 0.1, weight=half)], 1, 0.05)
+    x, y = (np.arange(40) + 0.5) / 40, (np.arange(40)[:, None] + 0.5) / 40
+    r2 = ((x - 0.5) ** 2 + (y - 0.5) ** 2) / 0.1**2
+    expected = half.values * 2.0 * (1 - r2 / 2) * np.exp(-r2 / 2)
+    got = divergence(grid, *state.velocity)
+    np.testing.assert_allclose(got, expected - expected.mean(), atol=6e-5 * 2)
+
+
+def test_a_step_of_no_length_leaves_a_growth_going(make_solver):
+    """Between two steps one of dt = 0 changes nothing: the divergence stays prescribed."""
+    growth = Growth((0.5, 0.5), 2.0, 0.1)
+    solver = make_solver(32, 32, stretch=1)
+    now, after = solver.rest(), solver.rest()
+    solver.step(now, after, [growth], 0.0, 0.02)
+    before = after.velocity[0]
+    solver.step(after, now, [growth], 0.02, 0.0)
+    np.testing.assert_allclose(now.velocity[0], before, atol=1e-3 * np.abs(before).max())
+
+
+def test_a_growth_at_rest_changes_nothing(make_solver):
+    """One of rate 0 beside a push in a variable viscosity: the same flow to the bit."""
+    x = (np.arange(32) + 0.5) / 32
+    stiff = 0.001 + (x > 0.6) * np.ones((32, 1))
+    push, ends = GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1), []
+    for forces in ([push], [push, Growth((0.5, 0.5), 0.0, 0.1)]):
+        ends.append(run(make_solver(32, 32, stretch=1, viscosity=stiff), forces, 5, 0.02).velocity[0])
+    np.testing.assert_array_equal(*ends)
+
+
+def test_too_much_growth_in_a_step_is_refused_with_the_remedy(make_solver):
+    with pytest.raises(ValueError, match=r"by exp\(1\) in a step of 0\.02 s.*more substeps"):
+        run(make_solver(16, 16), [Growth((0.5, 0.5), 50.0, 0.1)], 1, 0.02)
+
+
+@pytest.mark.parametrize("walls", ["free-slip", "periodic", "periodic,free-slip", "free-slip,periodic"])
+@pytest.mark.parametrize("scale", [0.3, 1.0, 2.0])
+def test_noise_is_never_far_stronger_than_said_nor_nothing(walls, scale):
+    """Whole waves on axes that wrap and ramps at walls: the rms of 20 seeds stays about the strength."""
+    grid = Grid(48, 36, 1.0, 0.75)
+    for seed in range(20):
+        force = NoiseForce(strength=1.0, scale=scale, seed=seed)
+        ((fx, fy),) = force.fields(grid, Walls.parse(walls))
+        rms, most = math.sqrt((fx**2 + fy**2).mean()), np.hypot(fx, fy).max()
+        assert 0.1 < rms < 3, (seed, rms)
+        assert most < force.reach, (seed, most)
+
+
 def test_growth_beside_something_stiff_converges_with_the_step(make_solver):
     """First order in dt: a quarter of the step leaves at most 0.4 of the error.
 
@@ -369,6 +421,8 @@ def test_a_push_that_does_not_fit_is_refused(text, says):
         lambda: VortexForce((0.1, 0.1), math.nan, 0.1),
         lambda: VortexForce((0.1, 0.1), 1e6, 0.1),
         lambda: Growth((0.1, 0.1), 1e3, 0.1),
+        lambda: Growth((0.1, 0.1), 1.0, 0.1, Instantaneous(0.1)),
+        lambda: GaussianForce((0.1, 0.1), (1, 1), 1e-40),
         lambda: Path((0, 1), ((0, 0),)),
         lambda: Path((1, 0), ((0, 0), (1, 1))),
         lambda: Path.along(((0, 0), (0, 0)), 0, 1),

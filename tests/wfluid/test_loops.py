@@ -133,6 +133,18 @@ def test_densities_and_points_loop_with_the_picture(device):
         assert np.abs(ends[0].points - ends[1].points).max() <= 1.01 * moved, loop
 
 
+def test_what_is_poured_late_is_seen_in_an_oscillating_loop(device):
+    """Densities flow into their beginning towards the end; nothing is subtracted, so none is negative."""
+    source = Source((0.5, 0.4), 5.0, 0.1, Constant(0.4, 0.6))
+    fluid = Fluid(densities=[Density(sources=[source])])
+    force = GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)
+    inks = np.array(
+        [f.densities["ink"] for f in animation("oscillate", [force], device, fluid=fluid).frames()]
+    )
+    assert inks.min() >= 0 and inks.max() > 0.9
+    assert inks[0].max() == 0 and inks[-1].max() < 0.2 * inks.max()
+
+
 def test_a_loop_that_cannot_be_is_refused(device):
     force = GaussianForce((0.5, 0.5), (1, 0), 0.1)
     with pytest.raises(ValueError, match="expected one of oscillate, pingpong, crossfade"):
