@@ -23,6 +23,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, *arguments, **settings):
         super().__init__(*arguments, allow_abbrev=False, **settings)
+        self._negative_number_matcher = re.compile(r"^-\.?\d")  # so that --wind -3,0 is a flag and its value
 
     def parse_known_args(self, args=None, namespace=None):
         """Parse; an unknown flag is refused here, where the verb's own flags are known."""

@@ -257,9 +257,8 @@ class Drawing:
             return Constant(start, end)
         if kind == "fade":
             return _fade(table, start, table.get("end", self.duration))
-        return Oscillator(
-            period=table["period"], phase=table.get("phase", 0.25), start=start, end=end, centred=False
-        )
+        phase = table.get("phase", 0.5 if self.loop == "oscillate" else 0.25)
+        return Oscillator(period=table["period"], phase=phase, start=start, end=end, centred=False)
 
 
 def _fade(table: Mapping[str, Any], start: float, end: float) -> Fade:

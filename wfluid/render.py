@@ -69,13 +69,17 @@ def run_scene(scene: Scene, how: Run) -> int:
         raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
     _check_names(scene, how)
 
+    notes: list[str] = []
+    animation = stage(scene, how.device, notes.append)
+    check_memory(animation, _kept_frames(scene.outputs))
+    writers = [] if how.preview or how.dry_run else _writers(scene, animation)
+
     def note(text: str) -> None:
         if not how.quiet:
             print(f"wfluid: note: {text}", file=sys.stderr)
 
-    animation = stage(scene, how.device, note)
-    check_memory(animation, _kept_frames(scene.outputs))
-    writers = [] if how.preview or how.dry_run else _writers(scene, animation)
+    for text in notes:  # said only now: what is refused is one line
+        note(text)
     if how.save_scene:
         write_scene(how.save_scene, _with_size(scene, animation.picture))
     if how.dry_run:

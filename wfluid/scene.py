@@ -142,7 +142,7 @@ class Scene:
         """The same scene for a file in another folder: its names of files begin there."""
 
         def renamed(name: str) -> str:
-            if name == SELF or os.path.isabs(name):
+            if os.path.isabs(name):
                 return name
             return os.path.relpath(self.folder / name, folder)
 
@@ -152,24 +152,24 @@ class Scene:
         """Every file that the scene reads."""
         found: list[str] = []
         _files_renamed(SCENE, {**self.tables, "output": []}, lambda name: found.append(name) or name)
-        return [self.folder / name for name in found if name != SELF]
+        return [self.folder / name for name in found]
 
     @property
     def outputs(self) -> list[Output]:
         """What is written.
 
         Raises:
-            PictureError: an encoding that no format has.
+            SceneError: an encoding that no format has.
         """
-        return [
-            Output(
-                self.folder / table["file"],
-                table.get("of", "picture"),
-                table.get("start", FIRST_FRAME),
-                Encoding(table.get("type"), table.get("compression"), table.get("quality")),
-            )
-            for table in self.tables.get("output", [])
-        ]
+        found = []
+        for n, table in enumerate(self.tables.get("output", [])):
+            try:
+                encoding = Encoding(table.get("type"), table.get("compression"), table.get("quality"))
+            except PictureError as error:
+                raise self.error(SchemaError(("output", n), str(error))) from None
+            of, start = table.get("of", "picture"), table.get("start", FIRST_FRAME)
+            found.append(Output(self.folder / table["file"], of, start, encoding))
+        return found
 
     @property
     def timeline(self) -> Timeline:
@@ -206,7 +206,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
         reason = re.sub(r" at line \d+ col \d+$", "", str(error))
         raise SceneError(f"{path}:{error.line}:{error.col}: no TOML: {reason}") from None
     except TOMLKitError as error:
-        raise SceneError(f"{path}: no TOML: {error}") from None
+        raise SceneError(f"{path}:{_line_of_failure(text)}:1: no TOML: {error}") from None
     return Scene(tables, path.parent, str(path), _lines_of(text))
 
 
@@ -225,6 +225,19 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
             temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
     except OSError as error:
         raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def _line_of_failure(text: str) -> int:
+    """The first line that makes a text wrong which is well formed, such as a key given twice."""
+    lines = text.splitlines(keepends=True)
+    for number in range(1, len(lines)):
+        try:
+            tomlkit.parse("".join(lines[:number]))
+        except ParseError:
+            continue  # the middle of a value of several lines
+        except TOMLKitError:
+            return number
+    return len(lines)
 
 
 def _one_of(path: tuple, name: str | None, known: Sequence[str]) -> None:
@@ -287,7 +300,8 @@ def _item(items: list, step: str, setting: str) -> int:
 def _files_renamed(what: Any, value: Any, rename: Callable[[str], str]) -> Any:
     """The value with what names a file renamed."""
     if isinstance(what, Key):
-        return rename(value) if what.file else value
+        named = what.file and not (what.file == "painting" and value == SELF)
+        return rename(value) if named else value
     if isinstance(what, Many):
         return [_files_renamed(what.each, item, rename) for item in value]
     if isinstance(what, Named):
@@ -299,7 +313,7 @@ def _files_renamed(what: Any, value: Any, rename: Callable[[str], str]) -> Any:
     }
 
 
-_HEADING = re.compile(r"^\s*\[(\[)?\s*([^\[\]]+?)\s*\]")
+_HEADING = re.compile(r"""^\s*\[(\[)?([\w."'\s-]+)\]\]?\s*(#.*)?$""")
 _SETTING = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
 
 
@@ -315,6 +329,7 @@ def _lines_of(text: str) -> dict[tuple, int]:
             for n, step in enumerate(steps):
                 table = (*table, step)
                 if heading[1] and n == len(steps) - 1:
+                    found.setdefault(table, number)
                     counts[table] = counts.get(table, -1) + 1
                 if table in counts:
                     table = (*table, counts[table])

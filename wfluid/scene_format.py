@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from wfluid.density import LOOKS
@@ -54,8 +55,8 @@ def _color(value: Any) -> str:
     return value.lower()
 
 
-def _file(meaning: str, required: bool = False) -> Key:
-    return Key(meaning, **text(), required=required, file=True)
+def _file(meaning: str, required: bool = False, kind: str = "painting") -> Key:
+    return Key(meaning, **text(), required=required, file=kind)
 
 
 _POINT = numbers(2, "two numbers, [x, y]")
@@ -115,6 +116,7 @@ FORCES = {
             **_CENTER,
             "factor": Key("how many times as long the centre becomes", **number(0.05, 20), required=True),
             **{name: key for name, key in _FORCE.items() if name != "at"},
+            "phase": replace(COURSE["phase"], default="0.25"),
             **_MASK,
         },
     ),
@@ -226,7 +228,7 @@ SCENE = Table(
         "picture": Table(
             "What is animated",
             {
-                "file": _file("the picture", required=True),
+                "file": _file("the picture", required=True, kind="file"),
                 "size": Key(
                     "width and height that the scene's pixels refer to",
                     **numbers(2, "two numbers, [width, height]"),
@@ -347,7 +349,7 @@ SCENE = Table(
                 "A picture or matte that goes through the same map",
                 {
                     "name": Key("what it is called", **text(), required=True),
-                    "file": _file("the picture, stretched over the animated one", required=True),
+                    "file": _file("the picture, stretched over the animated one", required=True, kind="file"),
                     "data": Key(
                         "whether its numbers are data, not colours", **flag(), default="true for one channel"
                     ),
@@ -365,7 +367,9 @@ SCENE = Table(
                 "What is written",
                 {
                     "file": _file(
-                        "x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report", required=True
+                        "x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report",
+                        required=True,
+                        kind="file",
                     ),
                     "of": Key(
                         "picture, tracks, report, or the name of a layer or density",

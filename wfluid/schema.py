@@ -49,8 +49,8 @@ class Key:
     """What it is when left out, for people; None where that needs no word."""
     required: bool = False
     """Whether it must be there."""
-    file: bool = False
-    """Whether it names a file, relative to the scene's folder."""
+    file: str = ""
+    """"file" where it names one, relative to the scene's folder; "painting" where `self` is none."""
 
 
 @dataclass(frozen=True)
