@@ -107,7 +107,7 @@ def test_the_readmes_python_runs(tmp_path):
 
 def test_every_option_of_the_command_is_in_the_readme():
     from wfluid.cli import _parser
-    from wfluid.scene_format import FORCES
+    from wfluid.scene_format import COURSE
 
     text = (ROOT / "README.md").read_text()
     (verbs,) = [a for a in _parser()._actions if a.dest == "verb"]
@@ -116,4 +116,4 @@ def test_every_option_of_the_command_is_in_the_readme():
         for action in parser._actions:
             for flag in action.option_strings:
                 assert flag in ("-h", "--help", "--output") or f"{flag}" in text, f"{verb} {flag}"
-    assert all(f"`{key}`" in text for key in FORCES["push"].keys if key not in ("center", "path", "by"))
+    assert all(f"`{key}`" in text for key in COURSE if key != "envelope")

@@ -99,7 +99,8 @@ def test_what_does_not_fit_is_refused_with_its_key(folder, tables, says):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("-o", "o.gif", "--report", "s.toml"), "a report is written as .json"),
+        (("-o", "o.gif", "--report", "s.toml"), "that is the scene itself"),
+        (("-o", "o.gif", "--report", "r.gif"), "a report is written as .json"),
         (("-o", "o.gif", "--preview", "s.toml"), "that is the scene itself"),
     ],
 )
