@@ -15,7 +15,8 @@ from wfluid.density import Density, PaintedSource, Source
 from wfluid.drawing import Drawing
 from wfluid.envelopes import product
 from wfluid.fluid import Fluid
-from wfluid.forces import BlobForce, Force, Group
+from wfluid.forces import BlobForce, Force, Group, flat
+from wfluid.loops import check_loop
 from wfluid.paintings import Paintings
 from wfluid.picture import Picture, PictureError, read_picture
 from wfluid.scene import Scene
@@ -75,7 +76,9 @@ class _Stage:
                 loop=self.loop,
             )
 
-        return _at(("time", "loop"), make) if self.loop else make()
+        if self.loop:
+            _at(("time", "loop"), lambda: check_loop(self.loop, flat(forces)))
+        return _at(("frames",), make)
 
     def _drawing(self) -> Drawing:
         """What the numbers of the scene's forces refer to."""

@@ -169,6 +169,11 @@ def test_what_is_no_toml_is_said_with_line_and_column(shots, capsys, old, new, l
     [
         ("duration = 0.2", "duration = 0.001  # here", "0.001 s at 10 fps is 0.01 frames"),
         (
+            "[[layer]]",
+            "[frames]\nscale = 10000  # here\n[[layer]]",
+            "width 600000: expected 1 … 32768 pixels",
+        ),
+        (
             'file = "o.####.png"',
             'file = "o.####.exr"\ncompression = "best"  # here',
             "compression 'best': exp",
@@ -270,6 +275,6 @@ def test_a_scene_that_moves_nothing_or_writes_nothing_is_refused(shots, capsys):
 
 def test_sizes_beyond_the_memory_are_refused(shots, capsys, monkeypatch):
     monkeypatch.setattr("wfluid.estimate.free_memory", lambda: 2 * 10**9)
-    reason = refused(capsys, shots, "--set", "fluid.cells=8000", "--set", "frames.width=30000")
+    reason = refused(capsys, shots, "--dry-run", "--set", "fluid.cells=8000", "--set", "frames.width=30000")
     assert "8000 x 5333 cells and 3 frames 30000 pixels wide need about " in reason
     assert "GB of memory, 2 GB are free" in reason

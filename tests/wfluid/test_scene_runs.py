@@ -241,8 +241,9 @@ def test_a_scene_saved_in_another_folder_finds_its_pictures_from_anywhere(folder
     assert frames(home, "a_right") == layers
 
 
-def test_saving_a_scene_alone_runs_nothing(folder, capsys):
+def test_saving_a_scene_alone_runs_nothing(folder, capsys, monkeypatch):
     """It says what its pixels refer to, so that a picture of another size may take its place."""
+    monkeypatch.setattr("wfluid.render._write_frames", lambda *_: pytest.fail("frames are made"))
     assert main(["animate", "small.png", "--push", "30,20:5,0", "--save-scene", "x.toml"]) == 0
     assert capsys.readouterr() == ("", "")
     assert read_scene("x.toml").tables == {
