@@ -12,7 +12,20 @@ from wfluid.kernels.strips import GIVEN_UP, STRIP, repeat_while, share, together
 
 import wfluid.device
 import wfluid.solver
-from wfluid import Fluid, Freeze, GaussianForce, Grid, Painted, Solver
+from wfluid import (
+    Buoyancy,
+    Density,
+    Fluid,
+    Freeze,
+    GaussianForce,
+    Grid,
+    Growth,
+    NoiseForce,
+    Painted,
+    Solver,
+    Source,
+    VortexForce,
+)
 from wfluid.device import Replay, helpers
 
 FORCE = GaussianForce((0.4, 0.5), (2.0, 1.0), 0.08)
@@ -65,6 +78,34 @@ def test_two_threads_compute_the_bits_of_one(cpu, monkeypatch, name):
             solver.step(a, b, [FORCE, WEIGHTED], step / 24, 1 / 24)
             a, b = b, a
         states.append([f.numpy() for f in (a.u, a.v, a.d_x, a.d_y, a.q)])
+    for one, two in zip(*states, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert np.abs(states[0][0]).max() > 0.01
+
+
+def test_two_threads_compute_the_bits_of_one_under_every_force(cpu, monkeypatch):
+    """Pushes, growth with its mean, fields, buoyancy, a density that cycles diffuse, and points."""
+    random = np.random.default_rng(0)
+    drop = Source((0.5, 0.4), 2.0, 0.1)
+    ink = Density(diffusion=0.05, initial=Painted(random.random((9, 9))), sources=[drop])
+    forces = [
+        FORCE,
+        WEIGHTED,
+        VortexForce((0.3, 0.4), 3.0, 0.1),
+        Growth((0.6, 0.4), 1.0, 0.1),
+        NoiseForce(strength=1.0, period=1.0),
+        Buoyancy("ink", (0.0, -1.0)),
+    ]
+    states = []
+    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    for least in (0, 10**9):
+        monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", least)
+        solver = Solver(Grid(129, 97, 1.0, 0.7), Fluid(densities=[ink]), cpu)
+        a, b = (solver.rest([(0.5, 0.5), (0.2, 0.3)]) for _ in range(2))
+        for step in range(4):
+            solver.step(a, b, forces, step / 24, 1 / 24)
+            a, b = b, a
+        states.append([f.numpy() for f in (a.u, a.v, a.d_x, a.d_y, *a.rho, a.p_x, a.p_y)])
     for one, two in zip(*states, strict=True):
         np.testing.assert_array_equal(one, two)
     assert np.abs(states[0][0]).max() > 0.01
