@@ -82,7 +82,8 @@ class Controls:
     def set(self, forces: Sequence[Force], t: float, dt: float, until: float, kept: float = 0.0) -> None:
         """Put a step of dt, in which forces act from t to `until`, on the device.
 
-        `kept` is the part of the last step's pressure that is taken for a first guess.
+        `kept` is the part of the last step's pressure that is taken for a first guess; none where
+        divergence is prescribed.
 
         Raises:
             ValueError: a force that would add more than the limit, with the force and the limit.
@@ -99,6 +100,7 @@ class Controls:
         for group in (*self._pushes, *self._growths):
             group.blobs.set([blobs[n] for n in group.members])
         self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
+        kept = 0.0 if self.prescribed else kept
         hx, hy = self.grid.hx, self.grid.hy
         numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
         integrals: dict[int, list[float]] = {}

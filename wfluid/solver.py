@@ -176,10 +176,9 @@ class Solver:
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
         controls = self._controls_for(forces)
-        kept, swelled = self._kept(dt), self._last_controls and self._last_controls.prescribed
-        controls.set(forces, t, dt, until, kept)
-        if controls.prescribed or swelled:
-            controls.set(forces, t, dt, until, 0.0)
+        swelled = self._last_controls is not None and self._last_controls.prescribed > 0
+        kept = self._kept(dt)
+        controls.set(forces, t, dt, until, 0.0 if swelled else kept)
         self._last_controls = controls
         for density in self._densities:
             density.set(t, until)
