@@ -57,8 +57,6 @@ class Drawing:
     """The animation's; in an oscillating loop forces go on through its end."""
     envelopes: Mapping[str, Envelope] = field(default_factory=dict)
     """Envelopes that forces speak of, by name."""
-    seed: int = 0
-    """Of noise that names none."""
     weight: Painted | None = None
     """Where forces act that name no mask."""
     frozen: Freeze | None = None
@@ -215,7 +213,7 @@ class Drawing:
         return NoiseForce(
             strength=table["amount"] / self.side * per_length,
             scale=table["scale"] / self.side if "scale" in table else DEFAULT_SCALE,
-            seed=table.get("seed", self.seed),
+            seed=table.get("seed", 0),
             period=table.get("change"),
             envelope=envelope,
             weight=self._mask(table),

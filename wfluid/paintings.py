@@ -23,7 +23,8 @@ DEFAULT_PAINTED_VISCOSITY = 0.1
 """Viscosity of a white place where nothing says it: over 6 % of the longer side it stops a motion in
 1/30 s."""
 
-_SAME_ASPECT = 0.01
+SAME_ASPECT = 0.01
+"""How much aspects may differ that count as one."""
 
 
 @dataclass
@@ -47,7 +48,7 @@ class Paintings:
             return self.picture
         painting = read_picture(self.folder / name, exact=True)
         aspect = painting.width / painting.height * self.picture.height / self.picture.width
-        if abs(aspect - 1) > _SAME_ASPECT:
+        if abs(aspect - 1) > SAME_ASPECT:
             self.note(
                 f"{name}: {painting.width} x {painting.height} pixels stretched over the picture's "
                 f"{self.picture.width} x {self.picture.height}"

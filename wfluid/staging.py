@@ -17,12 +17,10 @@ from wfluid.envelopes import product
 from wfluid.fluid import Fluid
 from wfluid.forces import BlobForce, Force, Group, flat
 from wfluid.loops import check_loop
-from wfluid.paintings import Paintings
+from wfluid.paintings import SAME_ASPECT, Paintings
 from wfluid.picture import Picture, PictureError, read_picture
 from wfluid.scene import Scene
 from wfluid.schema import SchemaError
-
-_SAME_ASPECT = 0.01
 
 
 def stage(
@@ -86,7 +84,7 @@ class _Stage:
         width, height = tables["picture"].get("size", (picture.width, picture.height))
         if min(width, height) <= 0:
             raise SchemaError(("picture", "size"), f"{width:g} x {height:g}: expected positive numbers")
-        if abs(width / height * picture.height / picture.width - 1) > _SAME_ASPECT:
+        if abs(width / height * picture.height / picture.width - 1) > SAME_ASPECT:
             raise SchemaError(
                 ("picture", "size"),
                 f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
@@ -108,7 +106,6 @@ class _Stage:
         return Drawing(
             **settings,
             envelopes=envelopes,
-            seed=tables.get("seed", 0),
             weight=_at(("effect", "mask"), lambda: self.paintings.mask(mask)),
             frozen=_at(("freeze",), lambda: self.paintings.freeze(tables.get("freeze"))),
             paintings=self.paintings,
