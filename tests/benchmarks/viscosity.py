@@ -47,7 +47,7 @@ def prepared(n, mu, alpha, device):
         solver.step(a, b, [FORCE], step * DT, DT)
         a, b = b, a
     velocity, rng = vector(solver.layout, device, 2), np.random.default_rng(0)
-    for f, ghosts in zip(velocity, solver._velocity_ghosts, strict=True):
+    for f, ghosts in zip(velocity, solver._stages.velocity_ghosts, strict=True):
         from_numpy(rng.standard_normal((n, n)), f, solver.layout)
         ghosts.fill(f)
     return solver, a, b, velocity
@@ -106,7 +106,7 @@ def main():
         print(f"{'':20s} {head[0]:20s}" + "".join(f"{word:>13s}" for word in head[1:]))
         for name, (mu, alpha) in media(n).items():
             solver, a, b, velocity = prepared(n, mu, alpha, device)
-            diffusion, projection = solver._diffusion, solver._projection
+            diffusion, projection = solver._stages.diffusion, solver._stages.projection
             missing = errors(diffusion, velocity)
             report = diffusion.measure()
             seconds = alternate(

@@ -1,0 +1,205 @@
+"""One step of the fluid: forces, advection, diffusion, projection (Bonilla & Velho, section II).
+
+    v1 = v0 + dt f                           forces
+    v2(x) = v1(foot of x)                    advection
+    v3 - dt div (2 mu S) + dt alpha v3 = v2  diffusion and drag, implicit Euler, S the strain of v3
+    v4 = v3 - beta grad q,  div beta grad q = div v3 - s,  beta = 1 / (1 + dt alpha)  projection
+
+s is the divergence that sources prescribe, as a rule 0.
+
+The foot is traced through v0, which is free of divergence, and carries the map along: v1 is not, and
+would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1; the two differ by
+O(dt^2) a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import warp as wp
+
+from wfluid.controls import Controls
+from wfluid.density_transport import DensityTransport
+from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
+from wfluid.fluid import Fluid
+from wfluid.grid import Grid
+from wfluid.kernels import advection, projection, transport
+from wfluid.kernels.cells import Layout
+from wfluid.kernels.strips import together
+from wfluid.medium import Medium
+from wfluid.projection import Projection
+from wfluid.state import State, Vector, vector, where
+from wfluid.walls import Ghosts
+
+
+class Stages:
+    """A step's stages and what they work with. They only launch, so that a graph may capture them."""
+
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+        self.grid, self.fluid, self.device = grid, fluid, device
+        self.layout = Layout(grid.nx, grid.ny)
+        walls = fluid.walls
+        self.velocity_ghosts = [
+            Ghosts(self.layout, rules, device) for rules in (walls.u_rules(), walls.v_rules())
+        ]
+        self.moved_ghosts = [
+            Ghosts(self.layout, rules, device) for rules in (walls.moved_x_rules(), walls.moved_y_rules())
+        ]
+        self.where = where(grid, walls, self.layout)
+        self.medium = None if fluid.separable else Medium(grid, fluid, device)
+        self.diffusion = (
+            CoupledDiffusion(fluid, self.medium, device)
+            if self.medium
+            else SeparateDiffusion(grid, fluid, device)
+        )
+        self.projection = Projection(grid, fluid, self.medium if fluid.freeze else None, device)
+        self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
+        self.foot = vector(self.layout, device, 2)
+        self.pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
+        self._solves: tuple = ()
+
+    foot: Vector
+    """Of the last trace [cells], with ghosts."""
+    pushed: Vector
+    """The velocity after forces, with ghosts; later without the pressure so far."""
+
+    def advance(self, state_in: State, state_out: State, controls: Controls) -> None:
+        """The step: launches only."""
+        if self.fluid.viscosity_moves:
+            self.follow_medium(state_in)
+        self.trace(state_in, controls)
+        self.carry_map(state_in, state_out)
+        self.carry_densities(state_in, state_out)
+        self.carry_points(state_in, state_out, controls)
+        velocity = self.push(state_in, controls)
+        velocity = self.advect(velocity)
+        velocity = self.subtract_pressure(velocity, state_in, controls)
+        velocity = self.diffuse(velocity)
+        self.project(velocity, (state_out.u, state_out.v), controls.prescribe if controls.swells else None)
+        if self.medium:
+            self.projection.add_pressure(state_in.q, controls.kept, state_out.q)
+
+    def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
+        """Make ready for a step of dt that ends at t; how its solves will go.
+
+        `prepare` is called where what `follow_medium` computes is out of date.
+        """
+        densities = tuple(density.plan(dt) for density in self.densities)
+        medium = self.medium
+        if not medium:
+            return self.diffusion.plan(dt), self.projection.how, *densities
+        if medium.follow(t, dt):
+            try:
+                self._solves = self.diffusion.plan(dt), self.projection.plan(dt)
+                if not self.fluid.viscosity_moves:
+                    prepare()
+            except BaseException:
+                medium.forget()  # half done
+                raise
+        return *self._solves, *densities
+
+    def kept(self, dt: float, last_dt: float, last: Controls | None) -> float:
+        """The part of the last step's pressure that a step of dt takes off before its diffusion.
+
+        None where viscosity changes or moves: the strain that belonged to it would be elsewhere. Nor where
+        the last step prescribed divergence, whose pressure is of that step alone.
+        """
+        medium = self.medium
+        if not medium or medium.changes or self.fluid.viscosity_moves or last_dt == 0 or last.prescribed:
+            return 0.0
+        return min(1.0, dt / last_dt)
+
+    def follow_medium(self, state: State | None = None) -> None:
+        """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""
+        if state:
+            self.medium.carry(state)
+        self.medium.spread()
+        self.diffusion.prepare()
+        if self.fluid.freeze:
+            self.projection.prepare()
+
+    def trace(self, state: State, controls: Controls) -> None:
+        """Find the feet of all centres."""
+        trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
+        inputs = [state.u, state.v, controls.dt_hx, controls.dt_hy, *self.where]
+        trace.launch(self.layout, self.device, inputs, self.foot)
+        with together():
+            for f, ghosts in zip(self.foot, self.moved_ghosts, strict=True):
+                ghosts.fill(f)
+
+    def push(self, state: State, controls: Controls) -> Vector:
+        """The velocity after forces, with ghosts."""
+        if not controls.pushes:
+            return state.u, state.v
+        controls.push(state, self.pushed)
+        self.fill(self.pushed)
+        return self.pushed
+
+    def carry_map(self, state_in: State, state_out: State) -> None:
+        """The displacement a step later."""
+        paper = self.fluid.scheme == "paper"
+        carry = transport.carry_map_bilinear if paper else transport.carry_map_cubic
+        inputs = [state_in.d_x, state_in.d_y, *self.foot, *self.where]
+        carry.launch(self.layout, self.device, inputs, [state_out.d_x, state_out.d_y])
+        with together():
+            for d, ghosts in zip((state_out.d_x, state_out.d_y), self.moved_ghosts, strict=True):
+                ghosts.fill(d)
+
+    def carry_densities(self, state_in: State, state_out: State) -> None:
+        """The densities a step later, with what their sources pour."""
+        for density, rho, out in zip(self.densities, state_in.rho, state_out.rho, strict=True):
+            density.advance(rho, self.foot, self.where, out)
+
+    def carry_points(self, state_in: State, state_out: State, controls: Controls) -> None:
+        """The points a step later."""
+        state = state_in
+        inputs = [state.p_x, state.p_y, state.u, state.v, controls.dt_hx, controls.dt_hy, *self.where]
+        out = [state_out.p_x, state_out.p_y]
+        transport.carry_points.launch(len(state.p_x), self.device, inputs, out)
+
+    def advect(self, velocity: Vector) -> Vector:
+        """The velocity carried along the flow, with ghosts."""
+        paper = self.fluid.scheme == "paper"
+        advect = advection.advect_face_bilinear if paper else advection.advect_face_cubic
+        with together():
+            for f, before, carried in zip(velocity, (1, self.layout.pitch), self._carried, strict=True):
+                inputs = [f, *self.foot, before, *self.where]
+                advect.launch(self.layout, self.device, inputs, [carried])
+        self.fill(self._carried)
+        return self._carried
+
+    def subtract_pressure(self, velocity: Vector, state: State, controls: Controls) -> Vector:
+        """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
+        if not self.medium:
+            return velocity
+        axes = ((1, controls.kept_hx), (self.layout.pitch, controls.kept_hy))
+        with together():
+            for f, (before, kept_h), pushed in zip(velocity, axes, self.pushed, strict=True):
+                projection.subtract_slope.launch(
+                    self.layout, self.device, [f, state.q, kept_h, before], [pushed]
+                )
+        self.fill(self.pushed)
+        return self.pushed
+
+    def diffuse(self, velocity: Vector) -> Vector:
+        """The velocity after viscosity and drag, with ghosts."""
+        if not self.diffusion.how.iterations:
+            return velocity
+        self.diffusion.diffuse(velocity)
+        return self.diffusion.out
+
+    def project(
+        self,
+        velocity: Vector,
+        out: Vector,
+        prescribe: Callable[[wp.array], None] | None = None,
+    ) -> None:
+        """The velocity without its divergence, with ghosts; `prescribe` adds to it what is to stay."""
+        self.projection.project(velocity, out, prescribe)
+        self.fill(out)
+
+    def fill(self, velocity: Vector) -> None:
+        """Fill the ghosts of a velocity, and zero its faces on walls."""
+        with together():
+            for f, ghosts in zip(velocity, self.velocity_ghosts, strict=True):
+                ghosts.fill(f)
