@@ -125,13 +125,16 @@ class Program:
         outputs: Sequence,
         rows: tuple[int, int] | None = None,
         boxes: wp.array | None = None,
+        turn: int | None = None,
     ) -> None:
         """Run the program on every cell of `layout`, or of its rows `rows[0]` to `rows[1]` - 1.
 
         A layered program runs for every n on the cells of its box: `boxes` holds, for each n, the
-        first column, the column after the last, the first row and the row after the last.
+        first column, the column after the last, the first row and the row after the last. A program that
+        writes to cells of other rows is run by one thread of a CPU: with a `turn`, which tells programs
+        that several threads may run beside each other apart.
         """
-        row, end = share(*(rows or (0, layout.ny)))
+        row, end = share(*(rows or (0, layout.ny)), turn)
         if row == end:
             return
         spans = layout.nx if device.is_cuda else -(-layout.nx // self.span)
@@ -142,6 +145,7 @@ class Program:
             inputs=[*inputs],
             outputs=[*outputs, *layers, row, spans, layout.first, layout.pitch],
             device=device,
+            record_tape=False,
         )
 
 
@@ -151,12 +155,20 @@ class Lines:
     def __init__(self, kernels: dict[str, wp.Kernel]):
         self.kernels = kernels
 
-    def launch(self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence) -> None:
-        """Run the function for t = 0 … lines - 1."""
-        first, end = share(0, lines)
+    def launch(
+        self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence, turn: int | None = None
+    ) -> None:
+        """Run the function for t = 0 … lines - 1; `turn` as for a `Program`."""
+        first, end = share(0, lines, turn)
         if first < end:
-            kernel = self.kernels["cuda" if device.is_cuda else "cpu"]
-            wp.launch(kernel, dim=end - first, inputs=[*inputs], outputs=[*outputs, first], device=device)
+            wp.launch(
+                self.kernels["cuda" if device.is_cuda else "cpu"],
+                dim=end - first,
+                inputs=[*inputs],
+                outputs=[*outputs, first],
+                device=device,
+                record_tape=False,
+            )
 
 
 _CELLS = """def {name}({signature}, row_: int, spans_: int, first_: int, pitch_: int):
@@ -168,6 +180,16 @@ _CELLS = """def {name}({signature}, row_: int, spans_: int, first_: int, pitch_:
 {hoisted}
     for c in range(SPAN):
         func(i + c, j, k + c, {arguments})
+"""
+
+_SPANS = """def {name}({signature}, row_: int, spans_: int, first_: int, pitch_: int):
+    t = wp.tid()
+    line = t // spans_
+    i = (t - line * spans_) * SPAN
+    j = row_ + line
+    k = first_ + j * pitch_ + i
+{hoisted}
+    func(i, j, k, {arguments})
 """
 
 _LAYERS = """def {name}(
@@ -194,7 +216,11 @@ _LINES = """def {name}({signature}, first_: int):
 """
 
 
-def cells(program: Callable, span: int = SPAN, module: str = "wfluid") -> Program:
+FORWARD, ADJOINT = "wfluid", "wfluid.adjoint"
+"""Modules: who never asks for a gradient never builds its kernels."""
+
+
+def cells(program: Callable, span: int = SPAN, module: str = FORWARD) -> Program:
     """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell.
 
     A layered program runs on whole spans: it must do nothing beyond its box within them. Programs
@@ -208,9 +234,26 @@ def cells(program: Callable, span: int = SPAN, module: str = "wfluid") -> Progra
     return Program(func, kernels, span)
 
 
-def lines(program: Callable) -> Lines:
+def adjoint_spans(program: Callable) -> Program:
+    """A program of the adjoint that runs once a span, from its first cell (i, j, k) on; on CUDA once a cell."""
+    spans = {"cpu": SPAN, "cuda": 1}
+    func, kernels = _kernels(program, skip=3, template=_SPANS, spans=spans, module=ADJOINT)
+    return Program(func, kernels, SPAN)
+
+
+def lines(program: Callable, module: str = FORWARD) -> Lines:
     """Make a function of (t, …) that runs once a line, one a thread on every device."""
-    return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1}, module="wfluid")[1])
+    return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1}, module=module)[1])
+
+
+def adjoint_cells(program: Callable) -> Program:
+    """A program of the adjoint."""
+    return cells(program, module=ADJOINT)
+
+
+def adjoint_lines(program: Callable) -> Lines:
+    """A function of lines of the adjoint."""
+    return lines(program, module=ADJOINT)
 
 
 def _kernels(program, skip, template, spans, module):
@@ -239,8 +282,8 @@ def _kernels(program, skip, template, spans, module):
     return func, kernels
 
 
-def module_of(kind: str, name: str = "wfluid") -> wp.Module:
-    """The Warp module that holds every kernel for "cpu" or "cuda"."""
+def module_of(kind: str, name: str = FORWARD) -> wp.Module:
+    """The Warp module `name` for "cpu" or "cuda"."""
     module = wp.get_module(f"{name}.{kind}")
     module.options.update(enable_backward=False, fuse_fp=kind == "cuda", cpu_compiler_flags=CPU_FLAGS)
     return module

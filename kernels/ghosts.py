@@ -11,7 +11,7 @@ product of both axes' signs, so rows and columns may be filled in any order.
 Written in place: only ghosts and faces on a wall are written, only other cells are read.
 """
 
-from wfluid.kernels.cells import Field, Indices, lines
+from wfluid.kernels.cells import Field, Indices, Real, adjoint_lines, lines
 
 
 @lines
@@ -50,3 +50,47 @@ def fill(
             if m > 2:
                 j = ny + m - 1
             f[j * pitch + i] = sign * row_sign[j] * f[row_source[j] * pitch + source]
+
+
+@adjoint_lines
+def fold_columns(
+    t: int,
+    row_source: Indices,
+    row_sign: Field,
+    ny: int,
+    pitch: int,
+    # outputs
+    f_bar: Field,
+):
+    """The transpose of `fill` along column t (counted with the halo): ghosts add to their sources.
+
+    They themselves come out as 0, and so do faces on a wall.
+    """
+    for m in range(5):
+        j = m
+        if m > 2:
+            j = ny + m - 1
+        ghost = f_bar[j * pitch + t]
+        f_bar[j * pitch + t] = Real(0.0)
+        f_bar[row_source[j] * pitch + t] += row_sign[j] * ghost
+
+
+@adjoint_lines
+def fold_rows(
+    t: int,
+    column_source: Indices,
+    column_sign: Field,
+    nx: int,
+    pitch: int,
+    # outputs
+    f_bar: Field,
+):
+    """The same along row t, after all columns."""
+    at = (t + 2) * pitch
+    for m in range(5):
+        i = m
+        if m > 2:
+            i = nx + m - 1
+        ghost = f_bar[at + i]
+        f_bar[at + i] = Real(0.0)
+        f_bar[at + column_source[i]] += column_sign[i] * ghost

@@ -77,10 +77,11 @@ class Strip:
         self._see(shared=True)
         return first + lines * self.index // self.count, first + lines * (self.index + 1) // self.count
 
-    def alone(self) -> bool:
-        """Whether what follows, which one strip does for all, is this one's to do."""
-        self._see(shared=False)
-        return self.index == 0
+    def alone(self, turn: int = 0) -> bool:
+        """Whether what follows, which one strip does for all, is this one's: strip `turn`, counted round."""
+        by = turn % self.count
+        self._see(shared=by > 0)
+        return self.index == by
 
     def _see(self, shared: bool) -> None:
         """Meet if what comes may read what another strip wrote; it writes itself."""
@@ -91,7 +92,8 @@ class Strip:
 
     def meet(self) -> None:
         """Wait here for the other strips."""
-        wp.launch(self.kernel, dim=1, inputs=[self.count, self.counter], device=self.counter.device)
+        inputs = [self.count, self.counter]
+        wp.launch(self.kernel, dim=1, inputs=inputs, device=self.counter.device, record_tape=False)
         self._wrote = "nothing"
         if self._wrote_before is not None:
             self._wrote_before = "nothing"
@@ -101,10 +103,14 @@ STRIP: ContextVar[Strip | None] = ContextVar("strip", default=None)
 """The strip whose launches are being captured; None where one thread runs them all."""
 
 
-def share(first: int, end: int) -> tuple[int, int]:
-    """The part of lines `first` … `end` - 1 that the current strip runs."""
+def share(first: int, end: int, turn: int | None = None) -> tuple[int, int]:
+    """The part of lines `first` … `end` - 1 that the current strip runs: all, if it is its `turn`, or none."""
     strip = STRIP.get()
-    return strip.share(first, end) if strip else (first, end)
+    if strip is None:
+        return first, end
+    if turn is None:
+        return strip.share(first, end)
+    return (first, end) if strip.alone(turn) else (end, end)
 
 
 @contextmanager

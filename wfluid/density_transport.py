@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-import numpy as np
 import warp as wp
 
-from wfluid.blobs import Blobs
-from wfluid.density import Density, PaintedSource, Source
+from wfluid.density import Density
 from wfluid.diffusion import ScalarDiffusion
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
-from wfluid.kernels import sources, transport
-from wfluid.kernels.cells import Layout, Real
+from wfluid.kernels import transport, transport_adjoint
+from wfluid.kernels.cells import Layout
 from wfluid.linear import Solve
 from wfluid.multigrid import Points
 from wfluid.state import Vector, field, from_numpy
@@ -31,13 +29,6 @@ class DensityTransport:
         if density.diffusion:
             self._diffusion = ScalarDiffusion(grid, fluid, Points(rules), device, conserved=True)
         self._carried = field(self.layout, device)
-        self._poured = [source for source in density.sources if isinstance(source, Source)]
-        self._blobs = Blobs(len(self._poured), grid, fluid.walls, device) if self._poured else None
-        self._painted = [source for source in density.sources if isinstance(source, PaintedSource)]
-        self._fields = [field(self.layout, device) for _ in self._painted]
-        for source, f in zip(self._painted, self._fields, strict=True):
-            from_numpy(source.paint.on(grid), f, self.layout)
-        self._impulses = wp.zeros(len(self._painted), dtype=Real, device=device)
         self._initial = None if density.initial is None else density.initial.on(grid)
 
     def begin(self, rho: wp.array) -> None:
@@ -50,25 +41,44 @@ class DensityTransport:
         """Make ready for steps of dt; what the diffusion's solve will be."""
         return self._diffusion.plan(dt * self.density.diffusion) if self._diffusion else Solve("none", 0)
 
-    def set(self, start: float, end: float) -> None:
-        """Put what the sources do from `start` to `end` [s] on the device."""
-        if self._blobs:
-            self._blobs.set([source.over(start, end) for source in self._poured])
-        if self._painted:
-            integrals = [source.envelope.integral(start, end) for source in self._painted]
-            self._impulses.assign(np.array(integrals))
+    def _diffuses(self) -> bool:
+        return bool(self._diffusion and self._diffusion.how.iterations)
 
-    def advance(self, rho: wp.array, foot: Vector, where: Sequence[int], out: wp.array) -> None:
-        """Out = the density a step later, with ghosts: launches only."""
-        diffuses = self._diffusion and self._diffusion.how.iterations
-        carried = self._carried if diffuses else out
-        inputs = [rho, *foot, *where]
-        transport.carry_density.launch(self.layout, self.device, inputs, [carried])
-        if self._blobs:
-            self._blobs.pour(carried)
-        for n, f in enumerate(self._fields):
-            inputs = [f, self._impulses[n : n + 1]]
-            sources.pour_field.launch(self.layout, self.device, inputs, [carried])
+    def advance(
+        self,
+        rho: wp.array,
+        foot: Vector,
+        where: Sequence[int],
+        pour: Callable[[wp.array], None],
+        out: wp.array,
+    ) -> None:
+        """Out = the density a step later, with ghosts; `pour` adds what its sources do: launches only."""
+        carried = self._carried if self._diffuses() else out
+        transport.carry_density.launch(self.layout, self.device, [rho, *foot, *where], [carried])
+        pour(carried)
         self._ghosts.fill(carried)
-        if diffuses:
+        if self._diffuses():
             self._diffusion.diffuse(carried, out)
+
+    def adjoint(
+        self,
+        out_bar: wp.array,
+        rho: wp.array,
+        foot: Vector,
+        where: Sequence[int],
+        pour_adjoint: Callable[[wp.array], None],
+        rho_bar: wp.array,
+        foot_bar: Vector,
+    ) -> None:
+        """The transpose of `advance`: adds to `rho_bar`, writes `foot_bar`: launches only."""
+        carried_bar = out_bar
+        if self._diffuses():
+            carried_bar = self._carried
+            self._diffusion.adjoint(out_bar, carried_bar)
+        pour_adjoint(carried_bar)
+        inputs, outputs = [rho, *foot, carried_bar, *where], [rho_bar, *foot_bar]
+        transport_adjoint.carry_density_adjoint.launch(self.layout, self.device, inputs, outputs, turn=0)
+
+    def fold(self, rho_bar: wp.array) -> None:
+        """Add the gradients with respect to ghosts to those of the cells they copy."""
+        self._ghosts.fold(rho_bar)

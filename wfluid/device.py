@@ -13,7 +13,7 @@ from pathlib import Path
 import warp as wp
 
 from wfluid.files import quiet_stderr
-from wfluid.kernels.cells import module_of, strips
+from wfluid.kernels.cells import FORWARD, module_of, strips
 from wfluid.kernels.strips import GIVEN_UP, STRIP, Strip
 
 LAUNCHES = threading.RLock()
@@ -133,14 +133,14 @@ def kernels_are_built(device: wp.Device) -> bool:
     return (Path(wp.config.kernel_cache_dir) / module.get_module_identifier(_threads(device))).is_dir()
 
 
-def load_kernels(device: wp.Device) -> float:
-    """Load every kernel for `device`, compiling them first if need be; returns the seconds it took.
+def load_kernels(device: wp.Device, module: str = FORWARD) -> float:
+    """Load every kernel of a module for `device`, compiling them first if need be; the seconds it took.
 
     Raises:
         RuntimeError: the kernels do not compile for this device.
     """
     start = time.perf_counter()
-    if module_of(_kind(device)).load(device, _threads(device)) is None:
+    if module_of(_kind(device), module).load(device, _threads(device)) is None:
         raise RuntimeError(f"the kernels could not be built for {device.alias}")
     return time.perf_counter() - start
 

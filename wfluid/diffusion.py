@@ -14,7 +14,7 @@ from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import krylov, relaxation, sources, viscosity
 from wfluid.kernels.cells import Layout, Real
-from wfluid.kernels.strips import together
+from wfluid.kernels.strips import alone, together
 from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
@@ -76,6 +76,21 @@ class ScalarDiffusion:
         relaxation.add_scaled.launch(self.layout, self.device, inputs, [out])
         top.fill((out,))
 
+    def adjoint(self, out_bar: wp.array, f_bar: wp.array) -> None:
+        """The transpose of `diffuse`, without ghosts: f_bar = out_bar + (1 - A) M out_bar."""
+        top, b = self.system.levels[0], self._change
+        alone(lambda: wp.copy(b[0], out_bar))
+        if self._conserved and self.how.method == "multigrid":
+            self._balance(*b)
+        self.system.solve(self.how, b, self._answer)
+        top.residual(self._answer, self._answer, b)
+        relaxation.add_scaled.launch(self.layout, self.device, [out_bar, *b, self._one], [f_bar])
+
+    @property
+    def adjoint_answer(self) -> wp.array:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return self._answer[0]
+
     def _balance(self, change: wp.array) -> None:
         """Take its mean off a change."""
         nx, ny, device = self.layout.nx, self.layout.ny, self.device
@@ -119,6 +134,16 @@ class SeparateDiffusion:
         """Out = the velocity (with ghosts) diffused, with ghosts."""
         for component, f, out in zip(self.components, velocity, self.out, strict=True):
             component.diffuse(f, out)
+
+    def adjoint(self, out_bar: Vector, f_bar: Vector) -> None:
+        """The transpose of `diffuse`, without ghosts."""
+        for component, bar, to in zip(self.components, out_bar, f_bar, strict=True):
+            component.adjoint(bar, to)
+
+    @property
+    def adjoint_answer(self) -> Vector:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return tuple(component.adjoint_answer for component in self.components)
 
     def measure(self) -> Residual:
         """What the last solve for u left, relative to the change it made."""
@@ -173,6 +198,24 @@ class CoupledDiffusion:
             for f, change, out in zip(self._start, self._answer, self.out, strict=True):
                 relaxation.add_scaled.launch(self.layout, self.device, [f, change, self._one], [out])
         top.fill(self.out)
+
+    def adjoint(self, out_bar: Vector, f_bar: Vector) -> None:
+        """The transpose of `diffuse`, without ghosts: f_bar = beta (out_bar - A lambda) + lambda."""
+        top, beta = self.system.levels[0], self.medium.levels[0].beta
+        answer = self._answer
+        self.system.solve(self.how, out_bar, answer, whole=out_bar)
+        top.residual(out_bar, answer, self._change)
+        with together():
+            for change, b, start in zip(self._change, beta, self._start, strict=True):
+                viscosity.dragged.launch(self.layout, self.device, [change, b], [start])
+        with together():
+            for start, f, to in zip(self._start, answer, f_bar, strict=True):
+                relaxation.add_scaled.launch(self.layout, self.device, [start, f, self._one], [to])
+
+    @property
+    def adjoint_answer(self) -> Vector:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return self._answer
 
     def measure(self) -> Residual:
         """What the last solve left, relative to the change it made."""

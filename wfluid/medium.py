@@ -109,6 +109,11 @@ class Medium:
         self._now = None
 
     @property
+    def painted_mu(self) -> wp.array:
+        """The viscosity where it is painted, with ghosts; that of the finest level where it does not move."""
+        return self._painted.mu
+
+    @property
     def changes(self) -> bool:
         """Whether the viscosity depends on the time."""
         return not isinstance(self.fluid.viscosity, float | Painted)

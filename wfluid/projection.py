@@ -9,12 +9,12 @@ import warp as wp
 from wfluid.equations import FIVE_POINT_INTERVAL, FivePoint, Resisted
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
-from wfluid.kernels import projection, relaxation
+from wfluid.kernels import projection, projection_adjoint, relaxation, viscosity
 from wfluid.kernels.cells import Layout, Real
 from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve, largest
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
-from wfluid.state import Vector, field
+from wfluid.state import Vector, field, vector
 
 PRESSURE_TOLERANCE = 5e-4
 """Of conjugate gradients; leaves about as much of the divergence as three cycles."""
@@ -43,6 +43,8 @@ class Projection:
         self._q, self._minus_div = ((field(self.layout, device),) for _ in range(2))
         numbers = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
         self._inverse_h = [numbers[0:1], numbers[1:2]]
+        self._minus_one = wp.array([-1.0], dtype=Real, device=device)
+        self._resisted = vector(self.layout, device, 2) if medium else ()
 
     def plan(self, dt: float) -> Solve:
         """Choose the solve for the medium's drag and steps of dt. `prepare` must follow."""
@@ -74,6 +76,49 @@ class Projection:
         subtract = projection.subtract_gradient_beta if beta else projection.subtract_gradient
         inputs = [*velocity, *self._q, *beta, *self._inverse_h, pitch]
         subtract.launch(self.layout, self.device, inputs, out)
+
+    def adjoint(
+        self,
+        out_bar: Vector,
+        velocity_bar: Vector,
+        fill: Callable[[Vector], None],
+        q_bar: wp.array | None = None,
+    ) -> None:
+        """The transpose of `project`: velocity_bar = out_bar - grad x, x = M (-div beta out_bar - q_bar).
+
+        Without drag that is the projection itself. `out_bar` comes with ghosts, which `fill` fills; `q_bar`
+        is the gradient with respect to the pressure projected. -x is that with respect to what `prescribe` added.
+        """
+        beta, pitch = self.medium.levels[0].beta if self.medium else (), self.layout.pitch
+        resisted = out_bar
+        if beta:
+            resisted = self._resisted
+            for f, b, to in zip(out_bar, beta, resisted, strict=True):
+                viscosity.dragged.launch(self.layout, self.device, [f, b], [to])
+            fill(resisted)
+        inputs = [*resisted, *self._inverse_h, pitch]
+        projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
+        if q_bar is not None:
+            inputs = [*self._minus_div, q_bar, self._minus_one]
+            relaxation.add_scaled.launch(self.layout, self.device, inputs, self._minus_div)
+        self.system.solve(self.how, self._minus_div, self._q)
+        inputs = [*out_bar, *self._q, *self._inverse_h, pitch]
+        projection.subtract_gradient.launch(self.layout, self.device, inputs, velocity_bar)
+
+    @property
+    def adjoint_answer(self) -> wp.array:
+        """x of the last `adjoint`."""
+        return self._q[0]
+
+    def kept_adjoint(self, velocity_bar: Vector, q_bar: wp.array, kept: wp.array, out: wp.array) -> None:
+        """The transpose of taking the part `kept` of the last pressure off and adding it again.
+
+        Out = kept (q_bar + div velocity_bar); `velocity_bar` with ghosts.
+        """
+        inputs = [*velocity_bar, *self._inverse_h, self.layout.pitch]
+        projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
+        inputs = [q_bar, *self._minus_div, kept]
+        projection_adjoint.kept_difference.launch(self.layout, self.device, inputs, [out])
 
     def add_pressure(self, q: wp.array, kept: wp.array, out: wp.array) -> None:
         """Out = the impulse of the pressure: the part `kept` of q, taken off before, and the projected."""

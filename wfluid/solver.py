@@ -10,11 +10,11 @@ from functools import partial
 import numpy as np
 import warp as wp
 
-from wfluid.controls import STEP_LIMIT, Controls
 from wfluid.device import Replay, exclusive, free_cores, helpers, load_kernels
 from wfluid.fluid import Fluid
 from wfluid.forces import Force, Group, flat
 from wfluid.grid import Grid
+from wfluid.impulses import STEP_LIMIT, Impulses
 from wfluid.kernels.cells import Layout
 from wfluid.linear import Residual
 from wfluid.stages import Stages
@@ -66,9 +66,9 @@ class Solver:
         self._stages = Stages(grid, fluid, device)
         self._last_dt = 0.0
         self._preparation: Replay | None = None
-        self._controls: dict[tuple, Controls] = {}
-        self._last_controls: Controls | None = None
-        self._replays: dict[tuple, tuple[Replay, State, State, Controls]] = {}
+        self._impulses: dict[tuple, Impulses] = {}
+        self._last_impulses: Impulses | None = None
+        self._replays: dict[tuple, tuple[Replay, State, State, Impulses]] = {}
         work = grid.nx * grid.ny * (COUPLED_WORK if self._stages.medium else 1)
         shared = not device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
         self._pool = helpers(STRIPS if shared else 1)
@@ -142,17 +142,15 @@ class Solver:
         until: float,
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
-        stages, controls = self._stages, self._controls_for(forces)
-        controls.set(forces, t, dt, until, stages.kept(dt, self._last_dt, self._last_controls))
-        self._last_controls, self._last_dt = controls, dt
-        for density in stages.densities:
-            density.set(t, until)
+        stages, impulses = self._stages, self._impulses_for(forces)
+        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, self._last_impulses))
+        self._last_impulses, self._last_dt = impulses, dt
         plan = stages.plan(until, dt, self._prepare)
-        key = (id(state_in), id(state_out), id(controls), plan)
+        key = (id(state_in), id(state_out), id(impulses), plan)
         if key not in self._replays:
-            work = partial(stages.advance, state_in, state_out, controls)
+            work = partial(stages.advance, state_in, state_out, impulses)
             replay = Replay(self.device, work, self._pool, STRIPS)
-            self._replays[key] = (replay, state_in, state_out, controls)
+            self._replays[key] = (replay, state_in, state_out, impulses)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
         self._replays[key] = self._replays.pop(key)  # the newest last
@@ -170,17 +168,17 @@ class Solver:
         stages = self._stages
         pressure, divergence = stages.projection.measure()
         prescribed, removed = 0.0, 0.0
-        if self._last_controls:
-            prescribed, removed = self._last_controls.prescribed, self._last_controls.removed
+        if self._last_impulses:
+            prescribed, removed = self._last_impulses.prescribed, self._last_impulses.removed
         return SolveReport(pressure, stages.diffusion.measure(), divergence, prescribed, removed)
 
     @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
         self._check(state_in, state_out)
-        controls = self._controls_for(())
-        controls.set((), 0.0, dt, dt)
-        self._stages.trace(state_in, controls)
+        impulses = self._impulses_for(())
+        impulses.set((), self.fluid, 0.0, dt, dt)
+        self._stages.trace(state_in, impulses)
         self._stages.carry_map(state_in, state_out)
 
     @exclusive
@@ -216,12 +214,10 @@ class Solver:
                     f"{len(self._stages.densities)} and {len(states[0].p_x)}"
                 )
 
-    def _controls_for(self, forces: Sequence[Force]) -> Controls:
-        key = Controls.key(forces)
-        if key not in self._controls:
-            if len(self._controls) >= REPLAYS_KEPT:
-                del self._controls[next(iter(self._controls))]
-            self._controls[key] = Controls(
-                forces, self.fluid.density_names, self.grid, self.fluid.walls, self.device
-            )
-        return self._controls[key]
+    def _impulses_for(self, forces: Sequence[Force]) -> Impulses:
+        key = Impulses.key(forces)
+        if key not in self._impulses:
+            if len(self._impulses) >= REPLAYS_KEPT:
+                del self._impulses[next(iter(self._impulses))]
+            self._impulses[key] = Impulses(forces, self.fluid, self.grid, self.device)
+        return self._impulses[key]

@@ -15,14 +15,15 @@ O(dt^2) a step.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import warp as wp
 
-from wfluid.controls import Controls
 from wfluid.density_transport import DensityTransport
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
+from wfluid.impulses import Impulses
 from wfluid.kernels import advection, projection, transport
 from wfluid.kernels.cells import Layout
 from wfluid.kernels.strips import together
@@ -63,21 +64,21 @@ class Stages:
     pushed: Vector
     """The velocity after forces, with ghosts; later without the pressure so far."""
 
-    def advance(self, state_in: State, state_out: State, controls: Controls) -> None:
+    def advance(self, state_in: State, state_out: State, impulses: Impulses) -> None:
         """The step: launches only."""
         if self.fluid.viscosity_moves:
             self.follow_medium(state_in)
-        self.trace(state_in, controls)
+        self.trace(state_in, impulses)
         self.carry_map(state_in, state_out)
-        self.carry_densities(state_in, state_out)
-        self.carry_points(state_in, state_out, controls)
-        velocity = self.push(state_in, controls)
+        self.carry_densities(state_in, state_out, impulses)
+        self.carry_points(state_in, state_out, impulses)
+        velocity = self.push(state_in, impulses)
         velocity = self.advect(velocity)
-        velocity = self.subtract_pressure(velocity, state_in, controls)
+        velocity = self.subtract_pressure(velocity, state_in, impulses)
         velocity = self.diffuse(velocity)
-        self.project(velocity, (state_out.u, state_out.v), controls.prescribe if controls.swells else None)
+        self.project(velocity, (state_out.u, state_out.v), impulses.prescribe if impulses.swells else None)
         if self.medium:
-            self.projection.add_pressure(state_in.q, controls.kept, state_out.q)
+            self.projection.add_pressure(state_in.q, impulses.kept, state_out.q)
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
         """Make ready for a step of dt that ends at t; how its solves will go.
@@ -98,7 +99,7 @@ class Stages:
                 raise
         return *self._solves, *densities
 
-    def kept(self, dt: float, last_dt: float, last: Controls | None) -> float:
+    def kept(self, dt: float, last_dt: float, last: Impulses | None) -> float:
         """The part of the last step's pressure that a step of dt takes off before its diffusion.
 
         None where viscosity changes or moves: the strain that belonged to it would be elsewhere. Nor where
@@ -118,20 +119,20 @@ class Stages:
         if self.fluid.freeze:
             self.projection.prepare()
 
-    def trace(self, state: State, controls: Controls) -> None:
+    def trace(self, state: State, impulses: Impulses) -> None:
         """Find the feet of all centres."""
         trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
-        inputs = [state.u, state.v, controls.dt_hx, controls.dt_hy, *self.where]
+        inputs = [state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
         trace.launch(self.layout, self.device, inputs, self.foot)
         with together():
             for f, ghosts in zip(self.foot, self.moved_ghosts, strict=True):
                 ghosts.fill(f)
 
-    def push(self, state: State, controls: Controls) -> Vector:
+    def push(self, state: State, impulses: Impulses) -> Vector:
         """The velocity after forces, with ghosts."""
-        if not controls.pushes:
+        if not impulses.pushes:
             return state.u, state.v
-        controls.push(state, self.pushed)
+        impulses.push(state, self.pushed)
         self.fill(self.pushed)
         return self.pushed
 
@@ -145,15 +146,15 @@ class Stages:
             for d, ghosts in zip((state_out.d_x, state_out.d_y), self.moved_ghosts, strict=True):
                 ghosts.fill(d)
 
-    def carry_densities(self, state_in: State, state_out: State) -> None:
+    def carry_densities(self, state_in: State, state_out: State, impulses: Impulses) -> None:
         """The densities a step later, with what their sources pour."""
-        for density, rho, out in zip(self.densities, state_in.rho, state_out.rho, strict=True):
-            density.advance(rho, self.foot, self.where, out)
+        for n, (density, rho) in enumerate(zip(self.densities, state_in.rho, strict=True)):
+            density.advance(rho, self.foot, self.where, partial(impulses.pour, n), state_out.rho[n])
 
-    def carry_points(self, state_in: State, state_out: State, controls: Controls) -> None:
+    def carry_points(self, state_in: State, state_out: State, impulses: Impulses) -> None:
         """The points a step later."""
         state = state_in
-        inputs = [state.p_x, state.p_y, state.u, state.v, controls.dt_hx, controls.dt_hy, *self.where]
+        inputs = [state.p_x, state.p_y, state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
         out = [state_out.p_x, state_out.p_y]
         transport.carry_points.launch(len(state.p_x), self.device, inputs, out)
 
@@ -168,11 +169,11 @@ class Stages:
         self.fill(self._carried)
         return self._carried
 
-    def subtract_pressure(self, velocity: Vector, state: State, controls: Controls) -> Vector:
+    def subtract_pressure(self, velocity: Vector, state: State, impulses: Impulses) -> Vector:
         """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
         if not self.medium:
             return velocity
-        axes = ((1, controls.kept_hx), (self.layout.pitch, controls.kept_hy))
+        axes = ((1, impulses.kept_hx), (self.layout.pitch, impulses.kept_hy))
         with together():
             for f, (before, kept_h), pushed in zip(velocity, axes, self.pushed, strict=True):
                 projection.subtract_slope.launch(

@@ -135,3 +135,14 @@ class Ghosts:
             inputs=[*self._tables, layout.nx, layout.ny, layout.pitch],
             outputs=[f],
         )
+
+    def fold(self, f_bar: wp.array) -> None:
+        """The transpose of `fill`: gradients with respect to ghosts go to what they are copies of, in place.
+
+        The ghosts, and the faces on a wall, come out as 0.
+        """
+        layout, (columns, rows) = self.layout, (self._tables[:2], self._tables[2:])
+        inputs = [*rows, layout.ny, layout.pitch]
+        ghosts.fold_columns.launch(layout.nx + 2 * HALO, self.device, inputs, [f_bar])
+        inputs = [*columns, layout.nx, layout.pitch]
+        ghosts.fold_rows.launch(layout.ny, self.device, inputs, [f_bar])

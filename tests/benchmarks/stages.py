@@ -87,7 +87,7 @@ def main():
         for step in range(6):
             solver.step(a, b, [FORCE], step * dt, dt)
             a, b = b, a
-        controls, top = solver._controls_for([FORCE]), solver._stages.projection.system.levels[0]
+        controls, top = solver._impulses_for([FORCE]), solver._stages.projection.system.levels[0]
         ten_sweeps = lambda: top.smooth(top.b, top.x, [top.plain] * 10, top.r, top.y)  # noqa: B023, E731
         stages = {
             "10 Jacobi sweeps": graph(device, ten_sweeps),

@@ -1,0 +1,21 @@
+"""The adjoint of projection (`projection`): D and G are each other's transposes but for the sign, so it is made
+of the same programs. Only the pressure that is kept from one step to the next needs one of its own.
+"""
+
+from wfluid.kernels.cells import Field, Uniform, adjoint_cells, inside
+
+
+@adjoint_cells
+def kept_difference(
+    i: int,
+    j: int,
+    k: int,
+    q_bar: Field,
+    minus_div: Field,
+    kept: Uniform,
+    # outputs
+    out: Field,
+):
+    """Out = kept (q_bar - minus_div): the transpose of v - kept grad q and of q_new = q_projected + kept q."""
+    k = inside(k)
+    out[k] = kept * (q_bar[k] - minus_div[k])

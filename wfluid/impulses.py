@@ -1,0 +1,269 @@
+"""What acts on the fluid in one step, on the device: its length, the forces' impulses, what sources pour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+import warp as wp
+
+from wfluid.fluid import Fluid
+from wfluid.forces import FORCE_LIMIT, STEP_GROWTH, Blob, BlobForce, Buoyancy, FieldForce, Force, Growth
+from wfluid.grid import Grid
+from wfluid.kernels import forces as kernels
+from wfluid.kernels import forces_adjoint, krylov
+from wfluid.kernels.cells import Layout, Real
+from wfluid.painted import Painted
+from wfluid.pouring import Pouring
+from wfluid.pushes import Growths, Pushes
+from wfluid.state import State, Vector, field, from_numpy, vector
+from wfluid.walls import Ghosts
+
+STEP_LIMIT = 10.0
+"""Longest step the solver is tested with [s]."""
+
+_STEP = 5
+"""Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
+
+Bar = Blob | list[float]
+"""The gradient with respect to what one force does in a step: its Gaussian's numbers, or its impulses'."""
+
+
+class Impulses:
+    """The numbers of a step with forces of certain kinds, and how they move the fluid.
+
+    Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too.
+    """
+
+    def __init__(
+        self, forces: Sequence[Force], fluid: Fluid, grid: Grid, device: wp.Device, gradients: bool = False
+    ):
+        self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
+        self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
+        walls, make = fluid.walls, (grid, fluid.walls, device, gradients)
+        pushes, growths = _by_weight(self._forces)
+        self._pushes = [Pushes(*group, *make) for group in pushes]
+        self._growths = [Growths(*group, *make) for group in growths]
+        self._fields: list[tuple[int, Vector]] = []
+        self._lifts: list[tuple[int, int]] = []
+        for n, force in enumerate(forces):
+            if isinstance(force, FieldForce):
+                self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
+            elif isinstance(force, Buoyancy):
+                self._lifts.append((n, _index_of(force.density, fluid.density_names)))
+        self._pourings = [Pouring(density, *make) for density in fluid.densities]
+        self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
+        self._lifted = field(self.layout, device) if self._lifts and gradients else None
+        self._rows = wp.zeros(2 * grid.ny, dtype=Real, device=device)
+        self._allocate()
+
+    prescribed: float
+    """Sum of the largest divergences that the last step's growths prescribe [1/s]."""
+
+    def another(self) -> Impulses:
+        """The same for another step: numbers of its own, working memory in common."""
+        other = copy(self)
+        for name in ("_pushes", "_growths", "_pourings"):
+            setattr(other, name, [group.another() for group in getattr(self, name)])
+        other._allocate()
+        return other
+
+    def _allocate(self) -> None:
+        impulses = len(self._fields) + 2 * len(self._lifts)
+        self._numbers = wp.zeros(_STEP + impulses, dtype=Real, device=self.device)
+        numbers = _entries(self._numbers)
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = numbers[:_STEP]
+        self._impulses = numbers[_STEP:]
+        self._impulses_bar = wp.zeros(impulses, dtype=Real, device=self.device)
+        self.prescribed = 0.0
+
+    @staticmethod
+    def key(forces: Sequence[Force]) -> tuple:
+        """What impulses are made for: forces of one key differ in numbers only."""
+        return tuple(
+            (isinstance(f, Growth), id(f.weight)) if isinstance(f, BlobForce) else (id(f),) for f in forces
+        )
+
+    @property
+    def pushes(self) -> bool:
+        """Whether anything adds to the velocity."""
+        return bool(self._pushes or self._fields or self._lifts)
+
+    @property
+    def swells(self) -> bool:
+        """Whether any force prescribes divergence."""
+        return bool(self._growths)
+
+    @property
+    def removed(self) -> float:
+        """Of the divergence prescribed, what had no place: its mean, taken off everywhere [1/s]."""
+        return float(sum(growths.mean.numpy()[0] for growths in self._growths))
+
+    def set(
+        self,
+        forces: Sequence[Force],
+        fluid: Fluid,
+        t: float,
+        dt: float,
+        until: float,
+        kept: float = 0.0,
+        live: bool = False,
+    ) -> None:
+        """Put a step of dt, in which forces and the fluid's sources act from t to `until`, on the device.
+
+        `kept` is the part of the last step's pressure that is taken for a first guess; none where
+        divergence is prescribed. With `live` forces count as acting even where their strengths are 0.
+
+        Raises:
+            ValueError: a force that would add more than the limit, with the force and the limit.
+        """
+        blobs = {n: force.over(t, until) for n, force in enumerate(forces) if isinstance(force, BlobForce)}
+        for blob in blobs.values():
+            if abs(blob.swell) * dt > STEP_GROWTH:
+                raise ValueError(
+                    f"the growth at {blob.center} would change areas by exp({blob.swell * dt:.3g}) in a step "
+                    f"of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer window help"
+                )
+            gained = max(blob.gained, abs(blob.swell) * blob.radius)
+            _check(f"the force at {blob.center}", gained, t, until)
+        for group in (*self._pushes, *self._growths):
+            alive = [live and forces[n].envelope.acts(t, until) for n in group.members]
+            group.blobs.set([blobs[n] for n in group.members], alive)
+        self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
+        kept = 0.0 if self.prescribed else kept
+        hx, hy = self.grid.hx, self.grid.hy
+        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
+        for n in dict.fromkeys(n for n, _ in self._fields):
+            integrals = forces[n].integrals(t, until)
+            _check("a force over the picture", forces[n].reach * max(map(abs, integrals)), t, until)
+            numbers += integrals
+        for n, _ in self._lifts:
+            impulse = forces[n].envelope.integral(t, until)
+            _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
+            numbers += [impulse * component for component in forces[n].vector]
+        self._numbers.assign(np.array(numbers))
+        for pouring, density in zip(self._pourings, fluid.densities, strict=True):
+            pouring.set(density, t, until, live)
+
+    def push(self, state: State, out: Vector) -> None:
+        """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
+        for f, to in zip((state.u, state.v), out, strict=True):
+            kernels.copied.launch(self.layout, self.device, [f], [to])
+        impulses = iter(self._impulses)
+        for (_, fields), impulse in zip(self._fields, impulses, strict=False):
+            for f, component in zip(fields, out, strict=True):
+                kernels.push_field.launch(self.layout, self.device, [f, impulse], [component])
+        for density, component, before, impulse in self._lifting(out):
+            inputs = [state.rho[density], impulse, before]
+            kernels.lift.launch(self.layout, self.device, inputs, [component])
+        for pushes in self._pushes:
+            pushes.add(out)
+
+    def _lifting(self, velocity: Vector) -> list[tuple[int, wp.array, int, wp.array]]:
+        """For each buoyancy and component: the density, the component, its stride and its impulse."""
+        lifting = []
+        for n, (_, density) in enumerate(self._lifts):
+            impulses = self._impulses[len(self._fields) + 2 * n :][:2]
+            for component, before, impulse in zip(velocity, (1, self.layout.pitch), impulses, strict=True):
+                lifting.append((density, component, before, impulse))
+        return lifting
+
+    def prescribe(self, b: wp.array) -> None:
+        """Add the divergence that is to stay to b = -div v, in place: launches only."""
+        for growths in self._growths:
+            growths.add(b)
+
+    def pour(self, density: int, rho: wp.array) -> None:
+        """Add what its sources pour to a density, in place: launches only."""
+        self._pourings[density].add(rho)
+
+    def push_adjoint(self, velocity_bar: Vector, state: State, rho_bar: Sequence[wp.array]) -> None:
+        """The transpose of `push` with respect to impulses and densities: launches only.
+
+        `velocity_bar` comes with zeros for ghosts; what densities lifted is added to `rho_bar`.
+        """
+        bars = iter(_entries(self._impulses_bar))
+        for _, fields in self._fields:
+            self._multiply(velocity_bar, fields, next(bars))
+        for density, f_bar, before, impulse in self._lifting(velocity_bar):
+            inputs = [state.rho[density], before]
+            forces_adjoint.mean_with_before.launch(self.layout, self.device, inputs, [self._lifted])
+            self._multiply([f_bar], [self._lifted], next(bars))
+            kernels.copied.launch(self.layout, self.device, [f_bar], [self._lifted])
+            self._velocity_ghosts[before > 1].fill(self._lifted)
+            inputs = [self._lifted, impulse, before]
+            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho_bar[density]])
+        for pushes in self._pushes:
+            pushes.adjoint(velocity_bar)
+
+    def _multiply(self, x: Sequence[wp.array], y: Sequence[wp.array], out: wp.array) -> None:
+        """The sum of x y over all points."""
+        nx, ny = self.layout.nx, self.layout.ny
+        for n, (f, g) in enumerate(zip(x, y, strict=True)):
+            inputs = [f, g, nx, self.layout.pitch, n * ny]
+            krylov.row_products.launch(ny, self.device, inputs, [self._rows])
+        krylov.mean_of.launch(1, self.device, [self._rows, len(x) * ny, 1], [out])
+
+    def prescribe_adjoint(self, b_bar: wp.array) -> None:
+        """The transpose of `prescribe`: launches only."""
+        for growths in self._growths:
+            growths.adjoint(b_bar)
+
+    def pour_adjoint(self, density: int, rho_bar: wp.array) -> None:
+        """The transpose of `pour` with respect to the sources: launches only."""
+        self._pourings[density].adjoint(rho_bar)
+
+    def gradients(self) -> dict[int, Bar]:
+        """What the last transposes found for each force, by its number."""
+        bars: dict[int, Bar] = {}
+        for group in (*self._pushes, *self._growths):
+            bars.update(zip(group.members, group.gradient(), strict=True))
+        members = [n for n, _ in self._fields] + [n for n, _ in self._lifts for _ in range(2)]
+        for n, bar in zip(members, self._impulses_bar.numpy(), strict=True):
+            bars.setdefault(n, []).append(float(bar))
+        return bars
+
+    def source_gradients(self) -> list[dict[int, Bar]]:
+        """The same for the sources of each density."""
+        return [pouring.gradients() for pouring in self._pourings]
+
+
+_Groups = list[tuple[Painted | None, list[int]]]
+
+
+def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
+    """The weights of Gaussian pushes, and of growths, each with the numbers of its forces."""
+    found: tuple[dict, dict] = {}, {}
+    for n, force in enumerate(forces):
+        if isinstance(force, BlobForce):
+            groups = found[isinstance(force, Growth)]
+            groups.setdefault(id(force.weight), (force.weight, []))[1].append(n)
+    return list(found[0].values()), list(found[1].values())
+
+
+def _entries(array: wp.array) -> list[wp.array]:
+    """Each number of an array, as an array."""
+    return [array[n : n + 1] for n in range(len(array))]
+
+
+def _index_of(name: str, densities: Sequence[str]) -> int:
+    if name not in densities:
+        there = ", ".join(densities) or "none"
+        raise ValueError(f"buoyancy reads the density {name!r}: expected one of the fluid's ({there})")
+    return list(densities).index(name)
+
+
+def _check(what: str, gained: float, t: float, until: float) -> None:
+    if not gained <= FORCE_LIMIT * STEP_LIMIT:
+        raise ValueError(
+            f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
+            f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
+        )
+
+
+def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:
+    fields = vector(layout, device, 2)
+    for value, f in zip(values, fields, strict=True):
+        from_numpy(value, f, layout)
+    return fields
