@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -107,7 +108,7 @@ class Controls:
         for n, _ in self._fields:
             if n not in integrals:
                 integrals[n] = forces[n].integrals(t, until)
-                gained = forces[n].reach * max(map(abs, integrals[n]))
+                gained = forces[n].reach * math.hypot(*integrals[n])
                 _check("a force over the picture", gained, t, until)
                 numbers += integrals[n]
         for n, _ in self._lifts:

@@ -83,13 +83,13 @@ class FieldForce(Force):
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
         """Accelerations [longer side/s^2] along x, y on the first nx x-faces and ny y-faces, each (ny, nx).
 
-        On closed walls they are 0.
+        On closed walls they are 0. Where `integrals` holds the acceleration they are factors without unit.
         """
 
     @property
     @abstractmethod
     def reach(self) -> float:
-        """Bound of the acceleration [longer side/s^2]."""
+        """Bound of each field, in the fields' unit [longer side/s^2]."""
 
     def integrals(self, start: float, end: float) -> list[float]:
         """What each field is multiplied by over a step [s]."""
@@ -276,17 +276,22 @@ class Wind(FieldForce):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vector", place("Wind.vector", self.vector))
-        _limited("wind", self.reach)
+        _limited("wind", math.hypot(*self.vector))
 
     @property
     def reach(self) -> float:
-        """Its acceleration [longer side/s^2]."""
-        return math.hypot(*self.vector)
+        """1: its fields are directions, and how strong it is their integrals say."""
+        return 1.0
 
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The vector on all faces within the walls."""
-        force = [np.full((grid.ny, grid.nx), value) for value in self.vector]
-        return [on_faces(force, self.weight, grid, walls)]
+        """The directions of x and of y on all faces within the walls; so its vector may vary."""
+        one, none = np.ones((grid.ny, grid.nx)), np.zeros((grid.ny, grid.nx))
+        return [on_faces(force, self.weight, grid, walls) for force in ((one, none), (none, one))]
+
+    def integrals(self, start: float, end: float) -> list[float]:
+        """The vector times the envelope's integral [longer side/s]."""
+        impulse = self.envelope.integral(start, end)
+        return [component * impulse for component in self.vector]
 
 
 @dataclass(frozen=True)
