@@ -11,7 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wfluid.density import PaintedSource, Source
 from wfluid.envelopes import Arbitrary, Constant, Envelope, Fade, Instantaneous, Oscillator, Product
+from wfluid.forces import Blob, Buoyancy, GaussianForce, Growth, Stroke, VortexForce, Wind
+from wfluid.image_force import ImageForce
+from wfluid.noise_force import NoiseForce
+from wfluid.painted import Painted
+from wfluid.paths import Path
 
 STEP = 3e-4
 """Of the differences: their error, STEP^4 / 30 times a fifth derivative (below 3e7), is below 9e-9; the
@@ -178,3 +184,116 @@ def test_an_envelope_of_ones_own_has_no_slopes():
     assert Ramp().slopes(0.0, 1.0) == {}
     assert set((Ramp() * 2).slopes(0.0, 1.0)) == {"gain"}
     assert (Ramp() * 2).slopes(0.0, 1.0)["gain"] == pytest.approx(0.5)
+
+
+def numbers(blob):
+    return np.array([*blob.center, blob.radius, *blob.push, blob.turn, blob.swell, blob.amount])
+
+
+def random_blob(random):
+    center, push = random.normal(size=(2, 2))
+    return Blob(tuple(center), random.normal(), tuple(push), *random.normal(size=3))
+
+
+CENTERS = {
+    "a place": (lambda random: random.uniform(size=2), ["center"]),
+    "a path": (lambda random: Path((0.2, 0.5, 0.61, 1.4), random.uniform(size=(4, 2))), ["center.places"]),
+    "a function": (lambda random: lambda t: (t, 1 - t), []),
+}
+
+COURSES = {
+    "constant": (lambda random: Constant(0.2, 1.3), []),
+    "centred": (centred, [f"envelope.{name}" for name in WAVE]),
+    "all": (ENVELOPES["all"][0], [f"envelope.{name}" for name in ENVELOPES["all"][1]]),
+}
+
+BLOBS = {
+    "push": (GaussianForce, "vector"),
+    "vortex": (VortexForce, "spin"),
+    "growth": (Growth, "rate"),
+    "source": (Source, "rate"),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("center", CENTERS)
+@pytest.mark.parametrize("kind", BLOBS)
+def test_a_gaussian_pulls_back_through_its_blob(kind, center, course, step):
+    """With random weights of all numbers of the blob, the gradient of their sum."""
+    random = np.random.default_rng([len(kind), len(center), len(step)])
+    (make, name), (place, center_names), (envelope, names) = BLOBS[kind], CENTERS[center], COURSES[course]
+    number = random.uniform(-2, 2, 2) if name == "vector" else random.uniform(-2, 2)
+    force = make(place(random), number, random.uniform(0.1, 0.3), envelope(random))
+    bar, (start, end) = random_blob(random), STEPS[step]
+    assert_slopes(
+        force.pull_back(start, end, bar),
+        [name, "radius", *center_names, *names],
+        lambda changed: numbers(bar) @ numbers(changed.over(start, end)),
+        force,
+    )
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("course", COURSES)
+def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(course, step):
+    random = np.random.default_rng(len(step))
+    path = Path((0.2, 0.5, 0.61, 1.4), random.uniform(size=(4, 2)))
+    stroke = Stroke(path, 0.2, random.uniform(0.5, 1.5), COURSES[course][0](random))
+    bar, (start, end) = random_blob(random), STEPS[step]
+    assert_slopes(
+        stroke.pull_back(start, end, bar),
+        ["strength", "radius", *COURSES[course][1]],
+        lambda changed: numbers(bar) @ numbers(changed.over(start, end)),
+        stroke,
+    )
+
+
+def buoyant(force, start, end):
+    """What each component of the vector times the density adds."""
+    return np.multiply(force.vector, force.envelope.integral(start, end))
+
+
+RAMP = np.arange(20.0).reshape(4, 5)
+FIELDS = {
+    "wind": (lambda random, envelope: Wind(random.normal(size=2), envelope), Wind.integrals, ["vector"]),
+    "buoyancy": (
+        lambda random, envelope: Buoyancy("ink", random.normal(size=2), envelope),
+        buoyant,
+        ["vector"],
+    ),
+    "noise": (lambda random, envelope: NoiseForce(strength=1, envelope=envelope), NoiseForce.integrals, []),
+    "picture": (lambda random, envelope: ImageForce(RAMP, envelope=envelope), ImageForce.integrals, []),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("kind", FIELDS)
+def test_a_field_pulls_back_through_its_integrals(kind, course, step):
+    random, (make, integrals, names) = np.random.default_rng(len(step)), FIELDS[kind]
+    force = make(random, COURSES[course][0](random))
+    bar = random.normal(size=np.shape(integrals(force, *STEPS[step])))
+    assert_slopes(
+        force.pull_back(*STEPS[step], bar),
+        [*names, *COURSES[course][1]],
+        lambda changed: bar @ integrals(changed, *STEPS[step]),
+        force,
+    )
+
+
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("course", COURSES)
+def test_a_painted_source_pulls_back_to_its_envelope(course, step):
+    source = PaintedSource(Painted(RAMP), COURSES[course][0](np.random.default_rng(1)))
+    assert_slopes(
+        source.pull_back(*STEPS[step], -0.7),
+        COURSES[course][1],
+        lambda changed: -0.7 * changed.envelope.integral(*STEPS[step]),
+        source,
+    )
+
+
+def test_noise_that_changes_pulls_nothing_back():
+    noise = NoiseForce(strength=1.0, period=0.5, envelope=Oscillator())
+    assert noise.pull_back(0.0, 0.1, noise.integrals(0.0, 0.1)) == {}
