@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from wfluid.envelopes import Constant, Envelope, finite
-from wfluid.forces import Blob, check_radius
+from wfluid.envelopes import Constant, Envelope, Slopes, finite, scaled
+from wfluid.forces import Blob, check_radius, impulse_slopes, shape_slopes
 from wfluid.painted import VISCOSITY_LIMIT, Painted
 from wfluid.paths import Center, as_center, place_at
 
@@ -48,6 +48,11 @@ class Source:
         amount = self.rate * self.envelope.integral(start, end)
         return Blob(place_at(self.center, (start + end) / 2), self.radius, amount=amount)
 
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """As `BlobForce.pull_back`, with respect to "rate", "radius", center and envelope."""
+        shape = shape_slopes(self.center, start, end, bar)
+        return impulse_slopes("rate", self.rate, self.envelope, start, end, bar.amount) | shape
+
 
 @dataclass(frozen=True, eq=False)
 class PaintedSource:
@@ -57,6 +62,10 @@ class PaintedSource:
     """Density gained [1/s]; for `Instantaneous` the density gained."""
     envelope: Envelope = field(default_factory=Constant)
     """Course in time."""
+
+    def pull_back(self, start: float, end: float, bar: float) -> Slopes:
+        """As of `FieldForce`: with respect to the envelope, from `bar`, the gradient to its integral."""
+        return scaled(self.envelope.slopes(start, end), bar, "envelope.")
 
 
 @dataclass(frozen=True, eq=False)

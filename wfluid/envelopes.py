@@ -10,10 +10,16 @@ import itertools
 import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+
+Slopes = dict[str, np.ndarray]
+"""Derivatives by numbers: each under its number's attribute path, "factors[0].period", and in its shape."""
+
+_Numbers = TypeVar("_Numbers", float, np.ndarray)
 
 _NODES, _WEIGHTS = (tuple(float(x) for x in values) for values in np.polynomial.legendre.leggauss(5))
 
@@ -40,17 +46,55 @@ class Envelope(ABC):
 
         By Gauss's rule of five points on pieces no longer than `span`, between the breaks.
         """
-        knots = sorted({start, end, *(t for t in self.breaks() if start < t < end)})
         total = 0.0
+        for middle, half in self._pieces(start, end):
+            total += half * sum(
+                w * self.value(middle + x * half) for x, w in zip(_NODES, _WEIGHTS, strict=True)
+            )
+        return total
+
+    def _pieces(self, start: float, end: float) -> Iterator[tuple[float, float]]:
+        """Middle and half the length of each piece that Gauss's rule takes [s]."""
+        knots = sorted({start, end, *(t for t in self.breaks() if start < t < end)})
         for a, b in itertools.pairwise(knots):
             pieces = min(_PIECES, max(1, math.ceil((b - a) / self.span)))
             half = (b - a) / pieces / 2
             for piece in range(pieces):
-                middle = a + (2 * piece + 1) * half
-                total += half * sum(
-                    w * self.value(middle + x * half) for x, w in zip(_NODES, _WEIGHTS, strict=True)
-                )
-        return total
+                yield a + (2 * piece + 1) * half, half
+
+    def value_slopes(self, t: float) -> Slopes:
+        """Derivatives of `value(t)` with respect to the numbers that may vary; none by default."""
+        return {}
+
+    def jumps(self, start: float, end: float) -> Iterator[tuple[float, str, float]]:
+        """Jumps of the value that move with a number: when [s], its name, the integral's slope by it.
+
+        That is the value before less the one after, times the moment's derivative. A jump on `start`
+        counts, on `end` not.
+        """
+        return iter(())
+
+    def slopes(self, start: float, end: float) -> Slopes:
+        """Derivatives of `integral(start, end)` with respect to the numbers that may vary.
+
+        By Gauss's rule, as `integral`, and the jumps that move.
+        """
+        total = {name: np.zeros_like(slope) for name, slope in self.value_slopes((start + end) / 2).items()}
+        for middle, half in self._pieces(start, end):
+            for x, w in zip(_NODES, _WEIGHTS, strict=True):
+                for name, slope in self.value_slopes(middle + x * half).items():
+                    total[name] += half * w * slope
+        return self._with_jumps(total, start, end)
+
+    def _with_jumps(self, slopes: Slopes, start: float, end: float) -> Slopes:
+        for _, name, slope in self.jumps(start, end):
+            slopes[name] += slope
+        return slopes
+
+    def acts(self, start: float, end: float) -> bool:
+        """Whether the integral over a step is other than 0, or would be for other numbers of the envelope."""
+        slopes = self.slopes(start, end).values()
+        return self.integral(start, end) != 0 or any(np.any(slope != 0) for slope in slopes)
 
     def __mul__(self, other: Envelope | float) -> Envelope:
         return product(self, other)
@@ -181,6 +225,13 @@ class Arbitrary(Envelope):
         t0, t1, v0, v1 = self.times[n - 1], self.times[n], self.values[n - 1], self.values[n]
         return v0 + (v1 - v0) * (t - t0) / (t1 - t0)
 
+    def value_slopes(self, t: float) -> Slopes:
+        """How much each sample counts, "values" (n,); the numbers of a function are its own."""
+        if self.function is not None:
+            return {}
+        inside = self.times[0] <= t <= self.times[-1]
+        return {"values": hats(self.times, t) if inside else np.zeros(len(self.times))}
+
     def breaks(self) -> tuple[float, ...]:
         """The samples' times."""
         return tuple(self.times)
@@ -245,18 +296,56 @@ class Oscillator(Envelope):
 
     def integral(self, start: float, end: float) -> float:
         """Closed form, so right for periods shorter than a step too."""
-        a, b = max(start, self.start) - self.start, min(end, self.end) - self.start
-        if b <= a:
-            return 0.0
-        total = self._primitive(b) - self._primitive(a)
+        return self._between(self._primitive, start, end)
+
+    def _between(self, primitive: Callable[[float], _Numbers], start: float, end: float) -> _Numbers:
+        """What a primitive gains over a step, half of it in the half period of half the amplitude."""
+        a = max(start, self.start) - self.start
+        b = max(a, min(end, self.end) - self.start)
+        total = primitive(b) - primitive(a)
         half = self.period / 2 if self.centred else 0.0
         if a < half:
-            total -= (self._primitive(min(b, half)) - self._primitive(a)) / 2
+            total -= (primitive(min(b, half)) - primitive(a)) / 2
         return total
 
     def _primitive(self, s: float) -> float:
         w = 2 * math.pi / self.period
         return -self.amplitude / w * math.cos(w * s + 2 * math.pi * self.phase)
+
+    def value_slopes(self, t: float) -> Slopes:
+        """With respect to "amplitude", "period" and "phase"."""
+        slopes = np.zeros(3)
+        if self.start <= t < self.end:
+            s = t - self.start
+            angle = 2 * math.pi * (s / self.period + self.phase)
+            turned = self.amplitude * 2 * math.pi * math.cos(angle)
+            slopes[:] = math.sin(angle), -turned * s / self.period**2, turned
+            if self.centred and s < self.period / 2:
+                slopes /= 2
+        return _by_name(slopes)
+
+    def jumps(self, start: float, end: float) -> Iterator[tuple[float, str, float]]:
+        """The end of the half amplitude, which moves by half of what the period does."""
+        t = self.start + self.period / 2
+        if self.centred and start <= t < min(end, self.end):
+            yield t, "period", self.amplitude * math.sin(2 * math.pi * self.phase) / 4
+
+    def slopes(self, start: float, end: float) -> Slopes:
+        """Closed form, with respect to "amplitude", "period" and "phase"."""
+        return self._with_jumps(_by_name(self._between(self._primitive_slopes, start, end)), start, end)
+
+    def _primitive_slopes(self, s: float) -> np.ndarray:
+        angle = 2 * math.pi * (s / self.period + self.phase)
+        cos, sin = math.cos(angle) / (2 * math.pi), self.amplitude * math.sin(angle)
+        return np.array(
+            [-self.period * cos, -self.amplitude * cos - sin * s / self.period, self.period * sin]
+        )
+
+
+def _by_name(slopes: np.ndarray) -> Slopes:
+    """An oscillator's three slopes, named."""
+    names = ("amplitude", "period", "phase")
+    return {name: np.array(slope) for name, slope in zip(names, slopes, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -288,21 +377,59 @@ class Product(Envelope):
 
     def integral(self, start: float, end: float) -> float:
         """Exact for one factor within windows; an instant takes the others' value at its moment."""
-        rest = []
         for n, factor in enumerate(self.factors):
             if isinstance(factor, Instantaneous):
-                others = self.factors[:n] + self.factors[n + 1 :]
-                there = math.prod(other.value(factor.at) for other in others)
-                return self.gain * there * factor.integral(start, end)
-            if isinstance(factor, Constant):
-                start, end = max(start, factor.start), min(end, factor.end)
-            else:
-                rest.append(factor)
+                return self._without(n).value(factor.at) * factor.integral(start, end)
+        start, end, rest = self._within(start, end)
         if end <= start:
             return 0.0
         if len(rest) > 1:
             return super().integral(start, end)
-        return self.gain * (rest[0].integral(start, end) if rest else end - start)
+        return self.gain * (self.factors[rest[0]].integral(start, end) if rest else end - start)
+
+    def _without(self, n: int) -> Product:
+        """The product where instant n is but a 1, from its moment on."""
+        return Product((*self.factors[:n], Constant(self.factors[n].at), *self.factors[n + 1 :]), self.gain)
+
+    def _within(self, start: float, end: float) -> tuple[float, float, list[int]]:
+        """The part of a step within the windows [s], and which factors are none."""
+        rest = []
+        for n, factor in enumerate(self.factors):
+            if isinstance(factor, Constant):
+                start, end = max(start, factor.start), min(end, factor.end)
+            else:
+                rest.append(n)
+        return start, max(start, end), rest
+
+    def value_slopes(self, t: float) -> Slopes:
+        """With respect to "gain", and the factors' own as "factors[n].name"."""
+        slopes = {"gain": np.array(math.prod((factor.value(t) for factor in self.factors), start=1.0))}
+        for n, factor in enumerate(self.factors):
+            slopes |= scaled(factor.value_slopes(t), self._others(n, t), f"factors[{n}].")
+        return slopes
+
+    def jumps(self, start: float, end: float) -> Iterator[tuple[float, str, float]]:
+        """Those of all factors, times the others' values."""
+        for n, factor in enumerate(self.factors):
+            for t, name, slope in factor.jumps(start, end):
+                yield t, f"factors[{n}].{name}", slope * self._others(n, t)
+
+    def _others(self, n: int, t: float) -> float:
+        """The product at time t without factor n."""
+        return self.gain * math.prod(other.value(t) for m, other in enumerate(self.factors) if m != n)
+
+    def slopes(self, start: float, end: float) -> Slopes:
+        """Exact where `integral` is; with respect to "gain", and the factors' own as "factors[n].name"."""
+        for n, factor in enumerate(self.factors):
+            if isinstance(factor, Instantaneous):
+                return scaled(self._without(n).value_slopes(factor.at), factor.integral(start, end))
+        start, end, rest = self._within(start, end)
+        if len(rest) > 1 and end > start:
+            return super().slopes(start, end)
+        slopes = {"gain": np.array(replace(self, gain=1.0).integral(start, end))}
+        for n in rest:
+            slopes |= scaled(self.factors[n].slopes(start, end), self.gain, f"factors[{n}].")
+        return slopes
 
 
 def product(*factors: Envelope | float) -> Envelope:
@@ -326,6 +453,23 @@ def product(*factors: Envelope | float) -> Envelope:
     if len(envelopes) == 1 and gain == 1.0:
         return envelopes[0]
     return Product(tuple(envelopes), gain)
+
+
+def scaled(slopes: Mapping[str, np.ndarray], factor: float, prefix: str = "") -> Slopes:
+    """Slopes times a factor, as new arrays, under names that begin with a prefix."""
+    return {prefix + name: np.array(factor * slope) for name, slope in slopes.items()}
+
+
+def hats(times: Sequence[float], t: float) -> np.ndarray:
+    """How much each of n samples counts at time t [s] between which lines are straight, (n,); 1 in sum.
+
+    Before the first sample it counts alone, and so does the last after it.
+    """
+    n = min(max(bisect_right(times, t), 1), len(times) - 1)
+    s = min(max((t - times[n - 1]) / (times[n] - times[n - 1]), 0.0), 1.0)
+    weights = np.zeros(len(times))
+    weights[n - 1 : n + 1] = 1.0 - s, s
+    return weights
 
 
 def finite(name: str, value: float) -> None:

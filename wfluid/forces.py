@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wfluid.envelopes import Constant, Envelope, Instantaneous, finite, product
+from wfluid.envelopes import Constant, Envelope, Instantaneous, Slopes, finite, product, scaled
 from wfluid.grid import Grid
 from wfluid.painted import Painted
-from wfluid.paths import Center, Path, Place, as_center, place, place_at
+from wfluid.paths import Center, Path, Place, as_center, center_slopes, place, place_at
 from wfluid.walls import Walls
 
 FORCE_LIMIT = 1e4
@@ -75,6 +75,15 @@ class BlobForce(Force):
     def over(self, start: float, end: float) -> Blob:
         """What it does from `start` to `end` [s]."""
 
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """The gradient with respect to the force's numbers, from `bar`, that to those of `over(start, end)`.
+
+        This is the transpose of the derivative of `over`, in float64, under attribute paths: "center" (2,),
+        or "center.places" (k, 2) of a `Path`; "envelope.period". What is not there, such as the numbers of
+        a function, is taken as fixed. Nothing by default.
+        """
+        return {}
+
 
 class FieldForce(Force):
     """A force that is a field over the picture times an envelope; or a sum of such."""
@@ -83,17 +92,25 @@ class FieldForce(Force):
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
         """Accelerations [longer side/s^2] along x, y on the first nx x-faces and ny y-faces, each (ny, nx).
 
-        On closed walls they are 0.
+        On closed walls they are 0. Where `integrals` holds the acceleration they are factors without unit.
         """
 
     @property
     @abstractmethod
     def reach(self) -> float:
-        """Bound of the acceleration [longer side/s^2]."""
+        """Bound of each field, in the fields' unit [longer side/s^2]."""
 
     def integrals(self, start: float, end: float) -> list[float]:
         """What each field is multiplied by over a step [s]."""
         return [self.envelope.integral(start, end)]
+
+    def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
+        """The gradient with respect to the force's numbers, from `bar`, that to each of `integrals`.
+
+        As `BlobForce.pull_back`; the fields, with the numbers that made them, are taken as fixed. By
+        default those of a lone field's envelope, and nothing of several fields.
+        """
+        return scaled(self.envelope.slopes(start, end), bar[0], "envelope.") if len(bar) == 1 else {}
 
 
 @dataclass(frozen=True)
@@ -130,6 +147,11 @@ class GaussianForce(BlobForce):
         push = (self.vector[0] * impulse, self.vector[1] * impulse)
         return Blob(place_at(self.center, (start + end) / 2), self.radius, push=push)
 
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """With respect to "vector" (2,), "radius", center and envelope."""
+        shape = shape_slopes(self.center, start, end, bar)
+        return impulse_slopes("vector", self.vector, self.envelope, start, end, bar.push) | shape
+
 
 @dataclass(frozen=True)
 class VortexForce(BlobForce):
@@ -163,6 +185,13 @@ class VortexForce(BlobForce):
         """Spin times radius times the envelope's integral."""
         turn = self.spin * self.radius * self.envelope.integral(start, end)
         return Blob(place_at(self.center, (start + end) / 2), self.radius, turn=turn)
+
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """With respect to "spin", "radius", center and envelope."""
+        slopes = impulse_slopes("spin", self.spin, self.envelope, start, end, self.radius * bar.turn)
+        slopes |= shape_slopes(self.center, start, end, bar)
+        slopes["radius"] += self.spin / self.radius * slopes["spin"]  # the turn is their product
+        return slopes
 
 
 @dataclass(frozen=True)
@@ -207,6 +236,15 @@ class Growth(BlobForce):
         mean = self.rate * course
         return Blob(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
 
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """With respect to "rate", "radius", center and envelope."""
+        shape = shape_slopes(self.center, start, end, bar)
+        if end > start:
+            mean = bar.swell / (end - start)
+            return impulse_slopes("rate", self.rate, self.envelope, start, end, mean) | shape
+        course = scaled(self.envelope.value_slopes(start), self.rate * bar.swell, "envelope.")
+        return {"rate": np.array(self.envelope.value(start) * bar.swell)} | course | shape
+
 
 @dataclass(frozen=True)
 class Stroke(BlobForce):
@@ -235,25 +273,38 @@ class Stroke(BlobForce):
             raise TypeError(f"Stroke.path: expected a Path, got {type(self.path).__name__}")
         check_radius("Stroke.radius", self.radius)
         finite("Stroke.strength", self.strength)
-        _limited("stroke", max(math.hypot(*push) for _, _, push in self._pieces()))
+        _limited("stroke", max(math.hypot(*push) for _, _, push in self._pieces(self.strength)))
 
-    def _pieces(self) -> Iterator[tuple[float, float, Place]]:
-        """From when to when it pushes how [longer side/s^2]."""
+    def _pieces(self, strength: float) -> Iterator[tuple[float, float, Place]]:
+        """From when to when one of a strength pushes how [longer side/s^2]."""
         knots = zip(self.path.times, self.path.places, strict=True)
         for (t0, (x0, y0)), (t1, (x1, y1)) in itertools.pairwise(knots):
             vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
-            factor = self.strength * math.hypot(vx, vy) / (self.radius * math.sqrt(2 * math.pi))
+            factor = strength * math.hypot(vx, vy) / (self.radius * math.sqrt(2 * math.pi))
             yield t0, t1, (vx * factor, vy * factor)
 
     def over(self, start: float, end: float) -> Blob:
         """The pieces of the path within the step, each in its direction."""
         px, py = 0.0, 0.0
-        for t0, t1, (ax, ay) in self._pieces():
+        for t0, t1, (ax, ay) in self._pieces(self.strength):
             if t0 < end and t1 > start:
                 impulse = self.envelope.integral(max(t0, start), min(t1, end))
                 px, py = px + ax * impulse, py + ay * impulse
         begin, stop = max(start, self.path.times[0]), min(end, self.path.times[-1])
         return Blob(self.path.at((begin + stop) / 2), self.radius, push=(px, py))
+
+    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+        """With respect to "strength", "radius" and envelope; the path is taken as fixed."""
+        own = 0.0
+        course = scaled(self.envelope.slopes(start, start), 0.0, "envelope.")
+        for t0, t1, push in self._pieces(1.0):
+            if t0 < end and t1 > start:
+                part, along = (max(t0, start), min(t1, end)), np.dot(push, bar.push)
+                own += self.envelope.integral(*part) * along
+                for name, slope in self.envelope.slopes(*part).items():
+                    course[f"envelope.{name}"] += self.strength * along * slope
+        radius = bar.radius - self.strength * own / self.radius
+        return {"strength": np.array(own), "radius": np.array(radius)} | course
 
 
 @dataclass(frozen=True)
@@ -276,17 +327,26 @@ class Wind(FieldForce):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vector", place("Wind.vector", self.vector))
-        _limited("wind", self.reach)
+        _limited("wind", math.hypot(*self.vector))
 
     @property
     def reach(self) -> float:
-        """Its acceleration [longer side/s^2]."""
-        return math.hypot(*self.vector)
+        """1: its fields are directions, and how strong it is their integrals say."""
+        return 1.0
 
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The vector on all faces within the walls."""
-        force = [np.full((grid.ny, grid.nx), value) for value in self.vector]
-        return [on_faces(force, self.weight, grid, walls)]
+        """The directions of x and of y on all faces within the walls; so its vector may vary."""
+        one, none = np.ones((grid.ny, grid.nx)), np.zeros((grid.ny, grid.nx))
+        return [on_faces(force, self.weight, grid, walls) for force in ((one, none), (none, one))]
+
+    def integrals(self, start: float, end: float) -> list[float]:
+        """The vector times the envelope's integral [longer side/s]."""
+        impulse = self.envelope.integral(start, end)
+        return [component * impulse for component in self.vector]
+
+    def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
+        """With respect to "vector" (2,) and envelope."""
+        return impulse_slopes("vector", self.vector, self.envelope, start, end, bar)
 
 
 @dataclass(frozen=True)
@@ -307,6 +367,10 @@ class Buoyancy(Force):
     def __post_init__(self) -> None:
         object.__setattr__(self, "vector", place("Buoyancy.vector", self.vector))
         _limited("buoyancy", math.hypot(*self.vector))
+
+    def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
+        """With respect to "vector" (2,) and envelope, from `bar` (2,), that to vector times integral."""
+        return impulse_slopes("vector", self.vector, self.envelope, start, end, bar)
 
 
 @dataclass(frozen=True)
@@ -346,6 +410,25 @@ def flat(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
             raise TypeError(f"expected a force or a Group of forces, got {type(force).__name__}")
         found += force.forces if isinstance(force, Group) else (force,)
     return tuple(found)
+
+
+def impulse_slopes(
+    name: str,
+    number: float | Place,
+    envelope: Envelope,
+    start: float,
+    end: float,
+    bar: float | Sequence[float],
+) -> Slopes:
+    """The gradient with respect to a number and its envelope, from `bar`, that to number times integral."""
+    own = np.multiply(bar, envelope.integral(start, end), dtype=np.float64)
+    return {name: np.array(own)} | scaled(envelope.slopes(start, end), np.dot(number, bar), "envelope.")
+
+
+def shape_slopes(center: Center, start: float, end: float, bar: Blob) -> Slopes:
+    """The gradient with respect to radius and center, from that to those of the blob of a step."""
+    radius = np.array(bar.radius, dtype=np.float64)
+    return {"radius": radius} | center_slopes(center, (start + end) / 2, bar.center)
 
 
 def on_faces(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 
@@ -136,7 +137,7 @@ class Impulses:
         numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
         for n in dict.fromkeys(n for n, _ in self._fields):
             integrals = forces[n].integrals(t, until)
-            _check("a force over the picture", forces[n].reach * max(map(abs, integrals)), t, until)
+            _check("a force over the picture", forces[n].reach * math.hypot(*integrals), t, until)
             numbers += integrals
         for n, _ in self._lifts:
             impulse = forces[n].envelope.integral(t, until)

@@ -32,6 +32,7 @@ class NoiseForce(FieldForce):
     psi is a sum of plane waves with random directions and phases, so it does not depend on the grid. Over
     half a scale it goes to 0 at closed walls; an axis that wraps has whole waves. Taken as differences of
     psi at nodes the force is free of divergence to rounding, hence acts in full (with a `weight` it is not).
+    Of noise that changes `pull_back` gives nothing.
 
     Raises:
         ValueError: a value outside its range.

@@ -8,7 +8,9 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from wfluid.envelopes import finite
+import numpy as np
+
+from wfluid.envelopes import Slopes, finite, hats
 
 Place = tuple[float, float]
 """x and y [longer side]."""
@@ -87,6 +89,16 @@ def place_at(center: Center, t: float) -> Place:
     if isinstance(center, Path):
         return center.at(t)
     return place(f"the center at {t:g} s", center(t)) if callable(center) else center
+
+
+def center_slopes(center: Center, t: float, bar: Place) -> Slopes:
+    """The gradient with respect to a center's numbers, from `bar`, that to where it is at time t [s].
+
+    "center" (2,), or "center.places" (k, 2) of a path; a function's numbers are its own.
+    """
+    if isinstance(center, Path):
+        return {"center.places": np.outer(hats(center.times, t), bar)}
+    return {} if callable(center) else {"center": np.array(bar, dtype=np.float64)}
 
 
 def place(name: str, values: Sequence[float]) -> Place:

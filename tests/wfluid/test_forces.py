@@ -7,6 +7,7 @@ import pytest
 from oracles import divergence
 
 from wfluid.command_scene import parse_force
+from wfluid.controls import Controls
 from wfluid.drawing import Drawing
 from wfluid.envelopes import Arbitrary, Constant, Fade, Instantaneous, Oscillator
 from wfluid.forces import GaussianForce, Group, Growth, Stroke, VortexForce, Wind, flat
@@ -89,6 +90,31 @@ def test_a_wind_is_uniform_within_the_walls(make_solver):
     for walls in ("free-slip", "periodic"):
         got = pushed(make_solver, [Wind((0.3, -0.2))], walls=walls)
         assert_on_faces(got, expected, walls == "periodic")
+
+
+def test_a_winds_fields_do_not_depend_on_its_vector():
+    """Two directions, painted by the weight and closed at walls; their integrals are the impulse."""
+    grid, walls = Grid(5, 4, 1.0, 0.8), Walls.parse("free-slip")
+    ramp = np.arange(20.0).reshape(4, 5)
+    gale, still = (Wind(vector, Constant(0.2, 1.3), Painted(ramp)) for vector in ((3.0, -4.0), (0.0, 0.0)))
+    np.testing.assert_array_equal(gale.fields(grid, walls), still.fields(grid, walls))
+    (x, none_y), (none_x, y) = gale.fields(grid, walls)
+    assert not none_x.any() and not none_y.any() and not x[:, 0].any() and not y[0].any()
+    np.testing.assert_allclose(x[:, 1:], (ramp[:, 1:] + ramp[:, :-1]) / 2)
+    np.testing.assert_allclose(y[1:], (ramp[1:] + ramp[:-1]) / 2)
+    assert gale.integrals(0.0, 1.0) == pytest.approx((2.4, -3.2))
+
+
+@pytest.mark.parametrize("blow", [9.99, -9.99, 10.01])
+def test_a_wind_beyond_the_limit_is_refused_with_the_velocity_it_would_give(device, blow):
+    """The limit holds for the whole vector, (6e3, 8e3) times the blow: 1e5 longer sides/s."""
+    wind = Wind((6e3, 8e3), blow * Instantaneous())
+    controls = Controls([wind], [], Grid(5, 4), Walls.parse("periodic"), device)
+    if abs(blow) < 10:
+        controls.set([wind], 0.0, 0.1, 0.1)
+        return
+    with pytest.raises(ValueError, match=r"a force over the picture would add a velocity of 100100 "):
+        controls.set([wind], 0.0, 0.1, 0.1)
 
 
 @pytest.mark.parametrize("cut", [1, 4, 7])
