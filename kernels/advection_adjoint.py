@@ -315,9 +315,13 @@ def add_face_means(
     k: int,
     centre_bar: Field,
     before: int,
+    nx: int,
     # outputs
     f_bar: Field,
 ):
-    """The transpose of `velocity_centre` for one component: face k is half of the centre on either side."""
+    """The transpose of `velocity_centre` for one component: face k is half of the centre on either side.
+
+    Ghosts, which the last span of a row runs into, keep what they are to be folded with.
+    """
     k = inside(k)
-    f_bar[k] = f_bar[k] + mean(centre_bar, k, before)
+    f_bar[k] = f_bar[k] + wp.where(i < nx, mean(centre_bar, k, before), Real(0.0))

@@ -122,12 +122,14 @@ def lift_adjoint(
     u_bar: Field,
     impulse: Uniform,
     before: int,
+    nx: int,
     # outputs
     rho_bar: Field,
 ):
-    """The transpose of `lift` with respect to the density; adds to it."""
+    """The transpose of `lift` with respect to the density; adds to it, but not to ghosts."""
     k = inside(k)
-    rho_bar[k] = rho_bar[k] + impulse * Real(0.5) * (u_bar[k] + u_bar[inside(k + before)])
+    both = u_bar[k] + u_bar[inside(k + before)]
+    rho_bar[k] = rho_bar[k] + wp.where(i < nx, impulse * Real(0.5) * both, Real(0.0))
 
 
 @adjoint_cells

@@ -200,7 +200,8 @@ class StepAdjoint:
                 ghosts.fill(f)
         with together():
             for f, before, out in zip(centre_bar, (1, pitch), velocity_bar, strict=True):
-                advection_adjoint.add_face_means.launch(layout, device, [f, before], [out])
+                inputs = [f, before, layout.nx]
+                advection_adjoint.add_face_means.launch(layout, device, inputs, [out])
         inputs = [state.p_x, state.p_y, *velocity, out_bar.p_x, out_bar.p_y, *step]
         outputs = [*velocity_bar, bar.p_x, bar.p_y]
         transport_adjoint.carry_points_adjoint.launch(len(state.p_x), self.device, inputs, outputs, turn=0)

@@ -193,7 +193,7 @@ class Impulses:
             self._multiply([f_bar], [self._lifted], next(bars))
             kernels.copied.launch(self.layout, self.device, [f_bar], [self._lifted])
             self._velocity_ghosts[before > 1].fill(self._lifted)
-            inputs = [self._lifted, impulse, before]
+            inputs = [self._lifted, impulse, before, self.layout.nx]
             forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho_bar[density]])
         for pushes in self._pushes:
             pushes.adjoint(velocity_bar)

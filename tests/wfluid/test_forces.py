@@ -7,11 +7,12 @@ import pytest
 from oracles import divergence
 
 from wfluid.command_scene import parse_force
-from wfluid.controls import Controls
 from wfluid.drawing import Drawing
 from wfluid.envelopes import Arbitrary, Constant, Fade, Instantaneous, Oscillator
+from wfluid.fluid import Fluid
 from wfluid.forces import GaussianForce, Group, Growth, Stroke, VortexForce, Wind, flat
 from wfluid.grid import Grid
+from wfluid.impulses import Impulses
 from wfluid.noise_force import NoiseForce
 from wfluid.painted import Painted
 from wfluid.paths import Path
@@ -109,12 +110,13 @@ def test_a_winds_fields_do_not_depend_on_its_vector():
 def test_a_wind_beyond_the_limit_is_refused_with_the_velocity_it_would_give(device, blow):
     """The limit holds for the whole vector, (6e3, 8e3) times the blow: 1e5 longer sides/s."""
     wind = Wind((6e3, 8e3), blow * Instantaneous())
-    controls = Controls([wind], [], Grid(5, 4), Walls.parse("periodic"), device)
+    fluid = Fluid(walls="periodic")
+    impulses = Impulses([wind], fluid, Grid(5, 4), device)
     if abs(blow) < 10:
-        controls.set([wind], 0.0, 0.1, 0.1)
+        impulses.set([wind], fluid, 0.0, 0.1, 0.1)
         return
     with pytest.raises(ValueError, match=r"a force over the picture would add a velocity of 100100 "):
-        controls.set([wind], 0.0, 0.1, 0.1)
+        impulses.set([wind], fluid, 0.0, 0.1, 0.1)
 
 
 @pytest.mark.parametrize("cut", [1, 4, 7])
