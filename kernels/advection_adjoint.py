@@ -283,9 +283,9 @@ def trace_midpoint_adjoint(
     u_centre_bar: Field,
     v_centre_bar: Field,
 ):
-    """The transpose of `trace_midpoint`, but for scatter and means: the gradients with respect to what it read,
+    """The transpose of `trace_midpoint`, but for scatter and means.
 
-    at the middle of the step (`place_middles`) and before that at the centre.
+    Gradients with respect to what it read at the middle of the step (`place_middles`), and at the centre.
     """
     k = inside(k)
     half = Real(0.5)

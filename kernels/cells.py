@@ -235,7 +235,7 @@ def cells(program: Callable, span: int = SPAN, module: str = FORWARD) -> Program
 
 
 def adjoint_spans(program: Callable) -> Program:
-    """A program of the adjoint that runs once a span, from its first cell (i, j, k) on; on CUDA once a cell."""
+    """A program of the adjoint that runs once a span, from its first cell on; on CUDA once a cell."""
     spans = {"cpu": SPAN, "cuda": 1}
     func, kernels = _kernels(program, skip=3, template=_SPANS, spans=spans, module=ADJOINT)
     return Program(func, kernels, SPAN)

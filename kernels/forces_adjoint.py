@@ -1,7 +1,7 @@
-"""The adjoint of forces and sources (`forces`, `sources`): how an objective depends on a Gaussian's numbers.
+"""The adjoint of forces and sources (`forces`, `sources`): gradients with respect to a Gaussian's numbers.
 
-All that a Gaussian g about c with radius sigma adds to a field is a polynomial of r = (x - c) / sigma times g,
-and so are the derivatives with respect to c, sigma and its strengths. So with F the gradient with
+All that a Gaussian g about c with radius sigma adds to a field is a polynomial of r = (x - c) / sigma
+times g, and so are the derivatives with respect to c, sigma and its strengths. So with F the gradient with
 respect to the field, the moments
 
     M_ab = sum over the points of  F r_x^a r_y^b g        a + b <= 4

@@ -1,5 +1,5 @@
-"""The adjoint of projection (`projection`): D and G are each other's transposes but for the sign, so it is made
-of the same programs. Only the pressure that is kept from one step to the next needs one of its own.
+"""The adjoint of projection (`projection`): D and G are each other's transposes but for the sign, so it is
+made of the same programs. Only the pressure that is kept from one step to the next needs one of its own.
 """
 
 from wfluid.kernels.cells import Field, Uniform, adjoint_cells, inside
@@ -16,6 +16,6 @@ def kept_difference(
     # outputs
     out: Field,
 ):
-    """Out = kept (q_bar - minus_div): the transpose of v - kept grad q and of q_new = q_projected + kept q."""
+    """Out = kept (q_bar - minus_div): transposes v - kept grad q, and q_new = q_projected + kept q."""
     k = inside(k)
     out[k] = kept * (q_bar[k] - minus_div[k])

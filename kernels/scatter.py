@@ -37,7 +37,8 @@ def _scatter_source(kind: str) -> str:
     all_x, all_y = weights.format("a", "x", "[PAD + c]"), weights.format("b", "y", "[c]")
     return f"""
     typedef wp::{Real.__name__} real;
-    enum {{ SPAN = {SPAN}, TAPS = {taps}, REACH = TAPS / 2 - 1, PAD = 4, SHIFTS = {SHIFTS}, NONE = -(1 << 30) }};
+    enum {{ SPAN = {SPAN}, TAPS = {taps}, REACH = TAPS / 2 - 1, PAD = 4 }};
+    enum {{ SHIFTS = {SHIFTS}, NONE = -(1 << 30) }};
 #if defined(__CUDA_ARCH__)
     if (i >= nx) return;
     real x[TAPS], y[TAPS];
@@ -46,7 +47,8 @@ def _scatter_source(kind: str) -> str:
     {one_y}
     for (int r = 0; r < TAPS; ++r)
         for (int q = 0; q < TAPS; ++q)
-            wp::atomic_add(f_bar, at.data[k] + (r - REACH) * pitch + q - REACH, x[q] * y[r] * out_bar.data[k]);
+            wp::atomic_add(
+                f_bar, at.data[k] + (r - REACH) * pitch + q - REACH, x[q] * y[r] * out_bar.data[k]);
 #else
     const wp::int32 cells = nx - i < SPAN ? nx - i : SPAN;
     alignas(64) real x[TAPS][SPAN + 2 * PAD] = {{}}, t[TAPS][SPAN + 2 * PAD] = {{}}, y[TAPS][SPAN];

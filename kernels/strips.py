@@ -104,7 +104,7 @@ STRIP: ContextVar[Strip | None] = ContextVar("strip", default=None)
 
 
 def share(first: int, end: int, turn: int | None = None) -> tuple[int, int]:
-    """The part of lines `first` … `end` - 1 that the current strip runs: all, if it is its `turn`, or none."""
+    """The part of lines `first` … `end` - 1 that the current strip runs; by `turn` all of them or none."""
     strip = STRIP.get()
     if strip is None:
         return first, end

@@ -1,4 +1,4 @@
-"""The adjoint of transport (`transport`): of densities and points. See `advection_adjoint`, which has the map's."""
+"""The adjoint of transport (`transport`): densities and points; the map's is `advection_adjoint`'s."""
 
 import warp as wp
 from wfluid.kernels.advection import cubic, locate

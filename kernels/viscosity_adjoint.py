@@ -1,6 +1,6 @@
 """The gradient with respect to viscosity (`viscosity`, `relaxation`).
 
-With A v = b solved, and lambda solving A lambda = v_bar, an objective changes with mu as -<lambda, (dA/dmu) v>.
+With A v = b solved, and A lambda = v_bar, an objective changes with mu as -<lambda, (dA/dmu) v>.
 <lambda, A v> is the power that the stress of v would do on the flow lambda: mu times the product of their
 strains, normal ones at centres, shear ones at nodes. Only so far as both solves go is it right.
 """

@@ -20,6 +20,7 @@ from wfluid.kernels.cells import ADJOINT, Real
 from wfluid.kernels.strips import alone, together
 from wfluid.stages import Stages
 from wfluid.state import State, Vector, field, vector
+from wfluid.walls import Ghosts
 
 
 class StepAdjoint:
@@ -59,6 +60,11 @@ class StepAdjoint:
 
     mu_bar: wp.array
     """The gradient with respect to viscosity where it is painted, at centres, added to by every step."""
+
+    def fold_viscosity(self) -> None:
+        """Bring what steps added to `mu_bar` for ghosts to the cells; after all of them."""
+        if self._moves:
+            Ghosts(self.layout, self.stages.fluid.walls.centre_rules(), self.device).fold(self.mu_bar)
 
     def set_step(self, dt: float) -> None:
         """Take the length of the steps [s]."""

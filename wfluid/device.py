@@ -41,9 +41,9 @@ class Replay:
     The calling thread is one of them, `pool`, which must have no other work, has the others.
     """
 
-    def __init__(self, device: wp.Device, work: Callable[[], None], pool: Helpers | None, threads: int):
+    def __init__(self, device: wp.Device, work: Callable[[], None], pool: Helpers | None):
         self._pool = pool
-        self._strips = strips(threads, device) if pool else [None]
+        self._strips = strips(pool.count + 1, device) if pool else [None]
         self._graphs = [_captured(device, work, strip) for strip in self._strips]
 
     def launch(self) -> None:
@@ -85,14 +85,17 @@ def _captured(device: wp.Device, work: Callable[[], None], strip: Strip | None) 
 class Helpers:
     """The threads beside the calling one. A forked process, which inherits none, gets its own."""
 
+    count: int
+    """How many there are."""
+
     def __init__(self, count: int):
-        self._count = count
+        self.count = count
         self._process, self._pool = os.getpid(), ThreadPoolExecutor(count)
 
     def submit(self, work: Callable, *arguments) -> Future:
         """Have one of them do `work`."""
         if self._process != os.getpid():
-            self._process, self._pool = os.getpid(), ThreadPoolExecutor(self._count)
+            self._process, self._pool = os.getpid(), ThreadPoolExecutor(self.count)
         return self._pool.submit(work, *arguments)
 
 

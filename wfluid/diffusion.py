@@ -20,6 +20,10 @@ from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, vector
 
+SURE_TOLERANCE = 1e-4
+"""Tolerance from which on the coupled equation is solved by conjugate gradients, which know when they are
+there, instead of a number of cycles that was measured to do."""
+
 
 class ScalarDiffusion:
     """(1 - dt mu Lap) f' = f for one field and constant mu.
@@ -172,7 +176,7 @@ class CoupledDiffusion:
             self.how = Solve("jacobi", self.fluid.sweeps)
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.how = sweeps
-        elif stiffness.jump > JUMP_LIMIT:
+        elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:
             self.how = Solve("conjugate gradients", ITERATION_LIMIT, tolerance)
         else:
             self.how = self.system.plan_cycles(tolerance)

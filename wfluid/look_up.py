@@ -105,7 +105,7 @@ class LookUp:
             wp.zeros(self._layout.size, dtype=lookup.Pixel, device=device) for _ in self._source.quads
         ]
         threads = 1 if device.is_cuda else min(free_cores(), STRIPS)
-        self._replay = Replay(device, self._look_up, helpers(threads), threads)
+        self._replay = Replay(device, self._look_up, helpers(threads))
 
     def launch(self, d_x: wp.array, d_y: wp.array) -> None:
         """Compute the coordinates and pixels of `render`, left in device memory."""

@@ -87,7 +87,7 @@ class Projection:
         """The transpose of `project`: velocity_bar = out_bar - grad x, x = M (-div beta out_bar - q_bar).
 
         Without drag that is the projection itself. `out_bar` comes with ghosts, which `fill` fills; `q_bar`
-        is the gradient with respect to the pressure projected. -x is that with respect to what `prescribe` added.
+        is the gradient with respect to the pressure found, -x that with respect to what `prescribe` added.
         """
         beta, pitch = self.medium.levels[0].beta if self.medium else (), self.layout.pitch
         resisted = out_bar

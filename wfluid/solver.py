@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import warp as wp
 
-from wfluid.device import Replay, exclusive, free_cores, helpers, load_kernels
+from wfluid.device import Replay, exclusive, load_kernels
 from wfluid.fluid import Fluid
 from wfluid.forces import Force, Group, flat
 from wfluid.grid import Grid
@@ -22,15 +22,6 @@ from wfluid.state import State, from_numpy
 
 REPLAYS_KEPT = 16
 """Pairs of states whose steps are kept captured; the oldest goes first."""
-
-STRIPS = 2
-"""Threads that share a step on a CPU: more wait for memory."""
-
-SHARED_CELLS = 300 * 300
-"""Cells from which on sharing a step gains more than the threads lose where other work runs beside it."""
-
-COUPLED_WORK = 4
-"""Times as much work that a coupled diffusion makes of a step."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +60,7 @@ class Solver:
         self._impulses: dict[tuple, Impulses] = {}
         self._last_impulses: Impulses | None = None
         self._replays: dict[tuple, tuple[Replay, State, State, Impulses]] = {}
-        work = grid.nx * grid.ny * (COUPLED_WORK if self._stages.medium else 1)
-        shared = not device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
-        self._pool = helpers(STRIPS if shared else 1)
+        self._pool = self._stages.helpers()
 
     @exclusive
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
@@ -143,13 +132,15 @@ class Solver:
     ) -> Replay:
         """The step, captured at first, with its numbers put where it reads them."""
         stages, impulses = self._stages, self._impulses_for(forces)
-        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, self._last_impulses))
+        last = self._last_impulses
+        swelled = last is not None and last.prescribed > 0
+        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, swelled))
         self._last_impulses, self._last_dt = impulses, dt
         plan = stages.plan(until, dt, self._prepare)
         key = (id(state_in), id(state_out), id(impulses), plan)
         if key not in self._replays:
             work = partial(stages.advance, state_in, state_out, impulses)
-            replay = Replay(self.device, work, self._pool, STRIPS)
+            replay = Replay(self.device, work, self._pool)
             self._replays[key] = (replay, state_in, state_out, impulses)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
@@ -159,7 +150,7 @@ class Solver:
     def _prepare(self) -> None:
         """Bring what depends on the medium up to date."""
         if self._preparation is None:
-            self._preparation = Replay(self.device, self._stages.follow_medium, self._pool, STRIPS)
+            self._preparation = Replay(self.device, self._stages.follow_medium, self._pool)
         self._preparation.launch()
 
     @exclusive

@@ -20,6 +20,7 @@ from functools import partial
 import warp as wp
 
 from wfluid.density_transport import DensityTransport
+from wfluid.device import Helpers, free_cores, helpers
 from wfluid.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.fluid import Fluid
 from wfluid.grid import Grid
@@ -31,6 +32,15 @@ from wfluid.medium import Medium
 from wfluid.projection import Projection
 from wfluid.state import State, Vector, vector, where
 from wfluid.walls import Ghosts
+
+STRIPS = 2
+"""Threads that share a step on a CPU: more wait for memory."""
+
+SHARED_CELLS = 300 * 300
+"""Cells from which on sharing a step gains more than the threads lose where other work runs beside it."""
+
+COUPLED_WORK = 4
+"""Times as much work that a coupled diffusion makes of a step."""
 
 
 class Stages:
@@ -80,6 +90,21 @@ class Stages:
         if self.medium:
             self.projection.add_pressure(state_in.q, impulses.kept, state_out.q)
 
+    def take_fluid(self, fluid: Fluid) -> None:
+        """Go on with a fluid that differs in the values of its viscosity, not in their kind."""
+        if fluid.viscosity is self.fluid.viscosity:
+            return
+        self.fluid = self.diffusion.fluid = fluid
+        if self.medium:
+            self.medium.fluid = fluid
+            self.medium.forget()
+
+    def helpers(self) -> Helpers | None:
+        """The threads that share the launches of a step beside the calling one, where that gains."""
+        work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.medium else 1)
+        shared = not self.device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
+        return helpers(STRIPS if shared else 1)
+
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
         """Make ready for a step of dt that ends at t; how its solves will go.
 
@@ -99,14 +124,14 @@ class Stages:
                 raise
         return *self._solves, *densities
 
-    def kept(self, dt: float, last_dt: float, last: Impulses | None) -> float:
+    def kept(self, dt: float, last_dt: float, swelled: bool) -> float:
         """The part of the last step's pressure that a step of dt takes off before its diffusion.
 
         None where viscosity changes or moves: the strain that belonged to it would be elsewhere. Nor where
-        the last step prescribed divergence, whose pressure is of that step alone.
+        the last step `swelled`, prescribed divergence: its pressure was of that step alone.
         """
         medium = self.medium
-        if not medium or medium.changes or self.fluid.viscosity_moves or last_dt == 0 or last.prescribed:
+        if not medium or medium.changes or self.fluid.viscosity_moves or last_dt == 0 or swelled:
             return 0.0
         return min(1.0, dt / last_dt)
 

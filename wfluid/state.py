@@ -81,6 +81,28 @@ class State:
         )
 
     @property
+    def arrays(self) -> list[wp.array]:
+        """Every array that has entries."""
+        return [
+            a for a in (self.u, self.v, self.d_x, self.d_y, self.q, *self.rho, self.p_x, self.p_y) if a.size
+        ]
+
+    @property
+    def gradient(self) -> State:
+        """The arrays that hold the gradients with respect to these; without ghosts."""
+        u, v, d_x, d_y, q, p_x, p_y = (
+            a.grad for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
+        )
+        return State(self.grid, u, v, d_x, d_y, q, tuple(rho.grad for rho in self.rho), p_x, p_y)
+
+    def take_gradient(self, bar: State) -> None:
+        """Let the arrays of `bar` hold the gradients."""
+        own = (self.u, self.v, self.d_x, self.d_y, self.q, *self.rho, self.p_x, self.p_y)
+        theirs = (bar.u, bar.v, bar.d_x, bar.d_y, bar.q, *bar.rho, bar.p_x, bar.p_y)
+        for a, b in zip(own, theirs, strict=True):
+            a.grad = b
+
+    @property
     def layout(self) -> Layout:
         """Where the cells lie in the arrays."""
         return Layout(self.grid.nx, self.grid.ny)

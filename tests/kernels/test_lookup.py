@@ -101,7 +101,7 @@ def test_edges_continue_the_picture(device, filter, edge, mode):
         f.fill_(pixels * cells)
     look_up = LookUp(image, grid, walls, device, filter=filter)
     look_up._edges[:] = LookUp(image, grid, Walls(), device, filter=filter, edge=edge)._edges
-    look_up._replay = Replay(device, look_up._look_up, None, 1)
+    look_up._replay = Replay(device, look_up._look_up, None)
     got = look_up.render(state.d_x, state.d_y).pixels
     padded = np.pad(image.pixels, ((100, 100), (100, 100), (0, 0)), mode=mode)
     expected = padded[100 + down : 100 + down + HEIGHT, 100 + right : 100 + right + WIDTH]

@@ -11,7 +11,7 @@ from wfluid.kernels.cells import strips
 from wfluid.kernels.strips import GIVEN_UP, STRIP, repeat_while, share, together
 
 import wfluid.device
-import wfluid.solver
+import wfluid.stages
 from wfluid import (
     Buoyancy,
     Density,
@@ -53,8 +53,8 @@ def cpu(device):
 
 def test_a_grid_of_few_rows_is_left_to_the_first_strip(cpu, monkeypatch):
     """No launch is shared, every meeting is a loop's, and both threads come to the end."""
-    monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0)
-    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
     mu = np.where(np.arange(160) % 40 < 20, 1.0, 0.001) * np.ones((30, 1))
     solver = Solver(Grid(160, 30, 1.0, 30 / 160), Fluid(viscosity=mu), cpu)
     a, b = solver.rest(), solver.rest()
@@ -69,8 +69,8 @@ def test_two_threads_compute_the_bits_of_one(cpu, monkeypatch, name):
     """Velocity, map and pressure of steps shared by two threads equal those of one, exactly."""
     states = []
     for threads in (1, 2):
-        monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0 if threads == 2 else 10**9)
-        monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+        monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0 if threads == 2 else 10**9)
+        monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
         solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(**FLUIDS[name]), cpu)
         assert (solver._pool is not None) == (threads == 2)
         a, b = solver.rest(), solver.rest()
@@ -97,9 +97,9 @@ def test_two_threads_compute_the_bits_of_one_under_every_force(cpu, monkeypatch)
         Buoyancy("ink", (0.0, -1.0)),
     ]
     states = []
-    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
     for least in (0, 10**9):
-        monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", least)
+        monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", least)
         solver = Solver(Grid(129, 97, 1.0, 0.7), Fluid(densities=[ink]), cpu)
         a, b = (solver.rest([(0.5, 0.5), (0.2, 0.3)]) for _ in range(2))
         for step in range(4):
@@ -170,7 +170,7 @@ def test_a_loop_in_a_graph_runs_as_often_on_every_strip(cpu):
         if STRIP.get().alone():
             wp.launch(count_down, dim=1, inputs=[passes, going], device=cpu)
 
-    replay = Replay(cpu, lambda: repeat_while(going, body), helpers(2), 2)
+    replay = Replay(cpu, lambda: repeat_while(going, body), helpers(2))
     for _ in range(300):  # a strip that read the condition late would leave the other waiting
         going.assign([1])
         passes.zero_()
@@ -187,8 +187,8 @@ def count_down(passes: wp.array[int], going: wp.array[int]):
 
 def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
     """The calling thread is stopped before its strip: the other ends, and the next step is right."""
-    monkeypatch.setattr(wfluid.solver, "SHARED_CELLS", 0)
-    monkeypatch.setattr(wfluid.solver, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
     solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(), cpu)
     a, b, c = solver.rest(), solver.rest(), solver.rest()
     solver.step(a, b, [FORCE], 0.0, 0.1)
@@ -215,7 +215,7 @@ def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
 def test_a_forked_process_steps_with_threads_of_its_own(cpu):
     """The child has inherited no helper; it must not wait for one."""
     code = (
-        "import os, wfluid.solver as module\n"
+        "import os, wfluid.stages as module\n"
         "from wfluid import Fluid, Grid, Solver\n"
         "from wfluid.device import open_device\n"
         "module.SHARED_CELLS, module.free_cores = 0, lambda: 2\n"

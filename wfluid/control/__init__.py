@@ -1,0 +1,1 @@
+"""Control of the whole simulation: objectives, their exact gradients, and what they are gradients by."""

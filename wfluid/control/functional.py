@@ -1,0 +1,231 @@
+"""An objective as a function of the numbers that are free, with its exact gradient: all an optimiser sees.
+
+    forces = [GaussianForce((0.4, 0.5), (1.0, 0.0), 0.1, Constant(0, 0.5))]
+    objective = ParticleMisfit([(0.4, 0.5)], [(0.6, 0.5)], time=1.0) + 1e-4 * Effort()
+    free = [Free("forces[0].vector"), Free("forces[0].center", scale=0.1)]
+    functional = Functional(grid, fluid, forces, Timeline(1.0), objective, free)
+    value, gradient = functional.value_and_gradient(functional.start)
+
+The gradient is that of the very numbers the simulation computes, discretisation, walls and all, by the
+adjoint method (Bonilla & Velho, section III): whatever the number of free numbers, it costs about two
+more runs. It is right to rounding; with respect to viscosity, to the residual of the diffusion's solves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wfluid.control.objectives import (
+    Effort,
+    Objective,
+    ParticleObjective,
+    StateObjective,
+    Term,
+    particles_of,
+    terms_of,
+    times_of,
+)
+from wfluid.control.recording import Recording, Reversed
+from wfluid.control.variables import VELOCITY, VISCOSITY, Free, Setup, Variables
+from wfluid.device import open_device
+from wfluid.diffusion import SURE_TOLERANCE
+from wfluid.fluid import Fluid
+from wfluid.forces import Force, Group, flat
+from wfluid.grid import Grid
+from wfluid.stages import Stages
+from wfluid.state import State
+from wfluid.timeline import Timeline
+
+
+class Functional:
+    """An objective of a run, as a function of the run's free numbers.
+
+    Making one loads the kernels; the first evaluation captures graphs, which later ones replay. It is for one
+    thread at a time.
+
+    Raises:
+        ValueError: nothing free, or a name that cannot be; an objective's time outside the run or between two
+            steps; a cap on memory too small; a velocity that does not fit the grid; a free viscosity, or
+            one that moves, whose diffusion is not solved well enough, or that depends on the time.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        fluid: Fluid,
+        forces: Sequence[Force | Group],
+        timeline: Timeline,
+        objective: Objective,
+        free: Sequence[Free],
+        *,
+        velocity: np.ndarray | None = None,
+        memory_mb: float | None = None,
+        device: str | None = None,
+    ):
+        """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
+
+        `memory_mb` caps what the states of the run take; with less room most steps are computed twice.
+        """
+        shape = (2, grid.ny, grid.nx)
+        velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
+        if velocity.shape != shape or not np.all(np.isfinite(velocity)):
+            raise ValueError(f"velocity of shape {velocity.shape}: expected finite numbers of shape {shape}")
+        setup = Setup(fluid, flat(forces), velocity)
+        self.grid, self.timeline, self.objective = grid, timeline, objective
+        self.variables = Variables(setup, free, grid)
+        self.start = self.variables.pack()
+        of_viscosity = self.variables.has(VISCOSITY)
+        _check_solves(fluid, of_viscosity)
+        stages = Stages(grid, fluid, open_device(device))
+        self._particles: list[tuple[float, ParticleObjective, slice]] = []
+        terms: dict[int, list[Term]] = {}
+        effort, begun = 0.0, 0
+        for weight, term in terms_of(objective):
+            own = slice(begun, begun + len(particles_of(term)))
+            begun = own.stop
+            steps = [self._step_of(t) for t in times_of(term)]
+            if isinstance(term, ParticleObjective):
+                self._particles.append((weight, term, own))
+            elif isinstance(term, StateObjective):
+                terms.setdefault(steps[0], []).append(term.term(stages, weight, own))
+            elif isinstance(term, Effort):
+                effort += weight
+            else:
+                raise TypeError(f"{type(term).__name__} is no objective that a run has")
+        points = np.concatenate([np.empty((0, 2)), *(particles_of(term) for _, term in terms_of(objective))])
+        if not np.all((points >= 0) & (points <= (grid.width, grid.height))):
+            raise ValueError("an objective's particles must begin within the picture")
+        self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
+        self._recording = Recording(stages, setup, timeline, points, terms, memory_mb, of_viscosity, effort)
+        self.evaluations = 0
+
+    start: np.ndarray
+    """The free numbers of the fluid and forces given, as a vector."""
+    evaluations: int
+    """How often a value has been asked for."""
+
+    @property
+    def memory(self) -> int:
+        """What the states of the run take [bytes]."""
+        return self._recording.memory
+
+    def setup(self, m: np.ndarray) -> Setup:
+        """Fluid, forces and velocity that a vector stands for.
+
+        Raises:
+            ValueError: a vector of another length, with numbers that are not finite, or out of range.
+        """
+        return self.variables.unpack(m)
+
+    def value(self, m: np.ndarray) -> float:
+        """The objective at m.
+
+        Raises:
+            ValueError: as `setup`, or a force that would add more than the limit.
+            FloatingPointError: the run does not stay finite; with the step from which on.
+        """
+        return self._forward(m)[0]
+
+    def value_and_gradient(self, m: np.ndarray) -> tuple[float, np.ndarray]:
+        """The objective at m and its gradient, of the length of m.
+
+        Raises:
+            ValueError: as `value`.
+            FloatingPointError: the run or the gradient is not finite; with the step where that begins.
+        """
+        value, pulls = self._forward(m)
+        found = self._recording.backward(pulls)
+        gradient = self.variables.pull_back(self._gradients(found), np.asarray(m, dtype=np.float64))
+        if not np.all(np.isfinite(gradient)):
+            self._recording.backward(pulls, watch=self._refuse)
+            raise FloatingPointError("the gradient is not finite at the beginning")
+        return value, gradient
+
+    def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray]]:
+        """The value, and the gradients with respect to the particles' places by step."""
+        self.evaluations += 1
+        recording = self._recording
+        self._setup = self.variables.unpack(m)
+        recording.set(self._setup)
+        places = recording.forward(self._looked_at)
+        value, pulls = recording.value, {}
+        for weight, term, own in self._particles:
+            for t in term.times:
+                step = self._step_of(t)
+                part, slope = term.at(t, places[step][own])
+                value += weight * part
+                pulls.setdefault(step, np.zeros_like(places[step]))[own] += weight * slope
+        if not np.isfinite(value):
+            step = recording.first_step_not_finite()
+            raise FloatingPointError(
+                "the objective is not finite"
+                if step is None
+                else f"the fluid is not finite from step {step} ({recording.time_of(step):.4g} s) on: "
+                "smaller forces or steps help"
+            )
+        return value, pulls
+
+    def _refuse(self, step: int, bar: State) -> None:
+        if not all(np.all(np.isfinite(a.numpy())) for a in bar.arrays):
+            t = self._recording.time_of(step)
+            raise FloatingPointError(f"the gradient is not finite from step {step} ({t:.4g} s) backward")
+
+    def _gradients(self, found: Reversed) -> dict[str, np.ndarray]:
+        """Gradients by name."""
+        gradients = {VELOCITY: found.velocity, VISCOSITY: found.viscosity}
+        if isinstance(self._setup.fluid.viscosity, float):
+            gradients[VISCOSITY] = np.asarray(found.viscosity.sum())
+        self._add_slopes(gradients, "forces", self._setup.forces, found.forces)
+        for d, density in enumerate(self._setup.fluid.densities):
+            bars = [step[d] for step in found.sources]
+            self._add_slopes(gradients, f"fluid.densities[{d}].sources", density.sources, bars)
+        return gradients
+
+    def _add_slopes(self, gradients: dict, where: str, forces: Sequence, steps: Sequence) -> None:
+        """Sum over the steps what each force's own numbers have for gradients."""
+        for n, force in enumerate(forces):
+            name = f"{where}[{n}]"
+            if not self.variables.has(name):
+                continue
+            for step, bars in enumerate(steps):
+                start, end = self._recording.time_of(step), self._recording.time_of(step + 1)
+                if not force.envelope.acts(start, end):
+                    continue
+                for key, slope in force.pull_back(start, end, bars[n]).items():
+                    gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
+
+    def _step_of(self, t: float) -> int:
+        """The step at whose end a time falls.
+
+        Raises:
+            ValueError: outside the run, or between two steps.
+        """
+        timeline = self.timeline
+        steps = (timeline.frames - 1) * timeline.steps_per_frame
+        end = timeline.time_of(steps)
+        if not 0 < t <= end * (1 + 1e-9):
+            raise ValueError(f"an objective at {t:g} s: expected a time after 0 and up to {end:g} s")
+        step = round(t / timeline.dt)
+        if abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt or step == 0:
+            before, after = (timeline.time_of(int(t / timeline.dt) + n) for n in (0, 1))
+            raise ValueError(
+                f"an objective at {t:g} s falls between steps, at {before:.6g} s and {after:.6g} s: choose "
+                "fps and substeps so that it falls on one"
+            )
+        return step
+
+
+def _check_solves(fluid: Fluid, free: bool) -> None:
+    """Refuse gradients with respect to a viscosity whose diffusion is not solved well enough."""
+    what = "a free viscosity" if free else "a viscosity that moves"
+    if not (free or fluid.viscosity_moves):
+        return
+    if fluid.solver == "jacobi":
+        raise ValueError(f"{what} needs a diffusion solved to a tolerance: set solver to 'multigrid'")
+    if fluid.diffusion_tolerance > SURE_TOLERANCE:
+        raise ValueError(
+            f"{what} has a gradient only as good as the diffusion's solve: set diffusion_tolerance to "
+            f"{SURE_TOLERANCE:g} or less, not {fluid.diffusion_tolerance:g}"
+        )

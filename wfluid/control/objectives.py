@@ -1,0 +1,386 @@
+"""What is to be made small: misfits of particles, of the map, of densities; effort; sums; a user's own.
+
+    objective = ParticleMisfit(points, destinations, time=1.0) + 1e-4 * Effort()
+
+Each is a frozen description; `functional` brings it to the device. Misfits are halves of weighted squares:
+their gradients are the weighted misfits themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from wfluid.kernels import krylov, misfit, transport_adjoint
+from wfluid.kernels.cells import Real
+from wfluid.kernels.strips import alone
+from wfluid.painted import Painted
+from wfluid.stages import Stages
+from wfluid.state import State, from_numpy, vector
+
+
+class Objective:
+    """A number that a run has. Objectives add and are multiplied by numbers."""
+
+    def __add__(self, other: Objective) -> Sum:
+        return Sum((*terms_of(self), *terms_of(other)))
+
+    def __mul__(self, weight: float) -> Sum:
+        return Sum(tuple((weight * own, term) for own, term in terms_of(self)))
+
+    __rmul__ = __mul__
+
+
+@dataclass(frozen=True)
+class Sum(Objective):
+    """Objectives, each times its weight.
+
+    Raises:
+        ValueError: a weight that is not finite.
+    """
+
+    terms: tuple[tuple[float, Objective], ...]
+    """Weight and objective of each."""
+
+    def __post_init__(self) -> None:
+        for weight, _ in self.terms:
+            if not math.isfinite(weight):
+                raise ValueError(f"an objective's weight is {weight}: expected a finite number")
+
+
+def particles_of(objective: Objective) -> np.ndarray:
+    """Where the particles begin that an objective looks at [longer side], (n, 2)."""
+    return getattr(objective, "points", np.empty((0, 2)))
+
+
+def times_of(objective: Objective) -> tuple[float, ...]:
+    """When an objective looks at the run [s]; none for one of the whole run."""
+    return getattr(objective, "times", ())
+
+
+def terms_of(objective: Objective) -> tuple[tuple[float, Objective], ...]:
+    """The parts of an objective with their weights."""
+    return objective.terms if isinstance(objective, Sum) else ((1.0, objective),)
+
+
+class ParticleObjective(Objective):
+    """An objective of where particles are at some times; computed on the host, in double precision."""
+
+    @abstractmethod
+    def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
+        """Its part of time t, one of `times`, and the gradient (n, 2), for particles at `places` (n, 2)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleMisfit(ParticleObjective):
+    """How far particles are from their destinations (Bonilla & Velho, section III, phi):
+
+        1/2 sum_n weight_n |x_n(t) - destination_n|^2    [longer side^2]
+
+    Raises:
+        ValueError: places that are not (n, 2) finite numbers, as many as points; negative weights.
+    """
+
+    points: np.ndarray
+    """Where the particles begin [longer side], (n, 2)."""
+    destinations: np.ndarray
+    """Where they should be [longer side], (n, 2)."""
+    time: float
+    """When [s]."""
+    weights: np.ndarray | float = 1.0
+    """How much each counts, (n,)."""
+
+    def __post_init__(self) -> None:
+        for name in ("points", "destinations"):
+            object.__setattr__(self, name, places_of(name, getattr(self, name)))
+        if len(self.points) != len(self.destinations):
+            raise ValueError(f"{len(self.points)} points and {len(self.destinations)} destinations")
+        weights = np.broadcast_to(np.asarray(self.weights, dtype=np.float64), len(self.points))
+        if not (np.all(np.isfinite(weights)) and np.all(weights >= 0)):
+            raise ValueError("weights of particles: expected finite numbers from 0 on")
+        object.__setattr__(self, "weights", weights)
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Its one time."""
+        return (self.time,)
+
+    def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
+        """Half the weighted sum of squares, and the weighted misfits."""
+        left = places - self.destinations
+        slope = self.weights[:, None] * left
+        return 0.5 * float(np.sum(slope * left)), slope
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleFunction(ParticleObjective):
+    """A function of where particles are.
+
+    Raises:
+        ValueError: points that are not (n, 2) finite numbers, or no times.
+    """
+
+    points: np.ndarray
+    """Where the particles begin [longer side], (n, 2)."""
+    function: Callable[[float, np.ndarray], tuple[float, np.ndarray]]
+    """Of the time [s] and the places (n, 2) [longer side]: a value, and its gradient (n, 2). Its values at
+    all times are summed."""
+    times: Sequence[float]
+    """When it is asked [s]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", places_of("points", self.points))
+        object.__setattr__(self, "times", tuple(float(t) for t in self.times))
+        if not self.times:
+            raise ValueError("a function of particles needs one time or more")
+
+    def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
+        """What the function says."""
+        value, slope = self.function(t, places)
+        slope = np.asarray(slope, dtype=np.float64)
+        if slope.shape != places.shape:
+            raise ValueError(f"a gradient of shape {slope.shape} for particles of shape {places.shape}")
+        return float(value), slope
+
+
+@dataclass(frozen=True)
+class Effort(Objective):
+    """What forces cost: 1/2 the integral of |f|^2 over picture and time [longer side^4/s^3].
+
+    f is the mean over a step of all that adds to the velocity, weights included, so that forces which
+    cancel cost nothing. A growth, which prescribes divergence, is not counted.
+    """
+
+
+class StateObjective(Objective):
+    """An objective of the fluid at one time."""
+
+    time: float
+    """When [s]."""
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Its one time."""
+        return (self.time,)
+
+    @abstractmethod
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """It on the device, for the grid and fluid of `stages`; `particles` are its own of the state's."""
+
+
+class Term(ABC):
+    """An objective of the fluid at one time, on the device, times its weight."""
+
+    @abstractmethod
+    def measure(self, state: State) -> None:
+        """Find its value at a state: launches only."""
+
+    @abstractmethod
+    def value(self) -> float:
+        """What the last `measure` found."""
+
+    @abstractmethod
+    def adjoint(self, state: State, bar: State) -> None:
+        """Add its gradient with respect to a state to `bar`: launches only."""
+
+    def record(self, tape: wp.Tape, state: State) -> None:
+        """Find its value, and have the tape add its gradient to the state's."""
+        self.measure(state)
+        tape.record_func(partial(self.adjoint, state, state.gradient), state.arrays)
+
+
+@dataclass(frozen=True, eq=False)
+class MapMisfit(StateObjective):
+    """How far the map is from another: 1/2 the integral over the picture of weight |d - target|^2.
+
+    d is the displacement source - x, as `State.displacement` has it [longer side].
+
+    Raises:
+        ValueError: a target that is not finite or not (2, ny, nx) of the grid.
+    """
+
+    target: np.ndarray
+    """Displacement that is wanted [longer side], (2, ny, nx)."""
+    time: float
+    """When [s]."""
+    weight: Painted | None = None
+    """Where it counts: a factor painted over the picture."""
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device, where displacements are in cells."""
+        grid = stages.grid
+        scales = (grid.hx, grid.hy)
+        target = _finite("MapMisfit.target", self.target, (2, grid.ny, grid.nx))
+        targets = [component / h for component, h in zip(target, scales, strict=True)]
+        squares = [weight * h**2 * grid.hx * grid.hy for h in scales]
+        return _FieldMisfit(stages, ("d_x", "d_y"), targets, squares, self.weight)
+
+
+@dataclass(frozen=True, eq=False)
+class DensityMisfit(StateObjective):
+    """How far a density is from another: 1/2 the integral over the picture of weight (rho - target)^2.
+
+    Raises:
+        ValueError: a density that does not exist; a target that is not finite or not (ny, nx) of the grid.
+    """
+
+    density: str
+    """Name of the `Density`."""
+    target: np.ndarray
+    """What is wanted, (ny, nx)."""
+    time: float
+    """When [s]."""
+    weight: Painted | None = None
+    """Where it counts: a factor painted over the picture."""
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device."""
+        grid, names = stages.grid, stages.fluid.density_names
+        if self.density not in names:
+            there = ", ".join(names) or "none"
+            raise ValueError(f"DensityMisfit of {self.density!r}: expected one of the fluid's ({there})")
+        target = _finite("DensityMisfit.target", self.target, (grid.ny, grid.nx))
+        squares = [weight * grid.hx * grid.hy]
+        return _FieldMisfit(stages, (names.index(self.density),), [target], squares, self.weight)
+
+
+class _FieldMisfit(Term):
+    """Half the weighted squares of fields at centres less what they should be."""
+
+    def __init__(
+        self,
+        stages: Stages,
+        names: Sequence[str | int],
+        targets: Sequence[np.ndarray],
+        squares: Sequence[float],
+        paint: Painted | None,
+    ):
+        self._names, self.layout, self.device, grid = names, stages.layout, stages.device, stages.grid
+        fields = len(names)
+        self._targets, self._weights, self._left, self._weighted = (
+            vector(self.layout, self.device, fields) for _ in range(4)
+        )
+        painted = np.ones((grid.ny, grid.nx)) if paint is None else paint.on(grid)
+        for n, (target, square) in enumerate(zip(targets, squares, strict=True)):
+            from_numpy(target, self._targets[n], self.layout)
+            from_numpy(square * painted, self._weights[n], self.layout)
+        self._rows = wp.zeros(fields * grid.ny, dtype=Real, device=self.device)
+
+    def _fields(self, state: State) -> list[wp.array]:
+        return [state.rho[name] if isinstance(name, int) else getattr(state, name) for name in self._names]
+
+    def measure(self, state: State) -> None:
+        """Sums along rows."""
+        layout = self.layout
+        for n, f in enumerate(self._fields(state)):
+            out = [self._left[n], self._weighted[n]]
+            inputs = [f, self._targets[n], self._weights[n]]
+            misfit.misfit.launch(layout, self.device, inputs, out)
+            inputs = [*out, layout.nx, layout.pitch, n * layout.ny]
+            krylov.row_products.launch(layout.ny, self.device, inputs, [self._rows])
+
+    def value(self) -> float:
+        """Half the sum over rows."""
+        return 0.5 * float(self._rows.numpy().sum(dtype=np.float64))
+
+    def adjoint(self, state: State, bar: State) -> None:
+        """The weighted misfit."""
+        for n, (f, to) in enumerate(zip(self._fields(state), self._fields(bar), strict=True)):
+            out = [self._left[n], self._weighted[n]]
+            inputs = [f, self._targets[n], self._weights[n]]
+            misfit.misfit.launch(self.layout, self.device, inputs, out)
+            transport_adjoint.add.launch(self.layout, self.device, [self._weighted[n]], [to])
+
+
+@dataclass(frozen=True, eq=False)
+class WarpObjective(StateObjective):
+    """An objective in Warp: kernels of one's own, which Warp differentiates.
+
+    @wp.kernel
+    def spread(x: wp.array[float], y: wp.array[float], value: wp.array[float]):
+        n = wp.tid()
+        wp.atomic_add(value, 0, x[n] * x[n] + y[n] * y[n])
+
+    def launch(state, value):
+            wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
+
+        WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
+    """
+
+    program: Callable[[State, wp.array], Any]
+    """Launches kernels that read the state's arrays (units as `State` says) and add to `value[0]`."""
+    time: float
+    """When [s]."""
+    points: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    """Where particles begin [longer side], (n, 2), whose places are the state's p_x and p_y."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", places_of("points", self.points))
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device."""
+        return _Program(self.program, weight, particles, stages.device)
+
+
+class _Program(Term):
+    """A user's launches, on a tape of their own."""
+
+    def __init__(
+        self, program: Callable[[State, wp.array], Any], weight: float, particles: slice, device: wp.Device
+    ):
+        self._program, self._weight, self._particles = program, weight, particles
+        self._value = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
+
+    def measure(self, state: State) -> None:
+        """Run the program."""
+        self._value.zero_()
+        p_x, p_y = (p[self._particles] for p in (state.p_x, state.p_y))
+        self._program(replace(state, p_x=p_x, p_y=p_y), self._value)
+
+    def value(self) -> float:
+        """Times the weight."""
+        return self._weight * float(self._value.numpy()[0])
+
+    def adjoint(self, state: State, bar: State) -> None:
+        """Nothing beside what Warp's own tape does."""
+
+    def record(self, tape: wp.Tape, state: State) -> None:
+        """Run the program on a tape, which is then played back as a part of the other."""
+        own = wp.Tape()
+
+        def forward() -> None:
+            with own:
+                self.measure(state)
+
+        def backward() -> None:
+            self._value.grad.fill_(self._weight)
+            own.backward()
+
+        alone(forward)
+        tape.record_func(partial(alone, backward), [self._value])
+
+
+def places_of(name: str, values: Any) -> np.ndarray:
+    """Places as (n, 2) finite numbers.
+
+    Raises:
+        ValueError: they are not.
+    """
+    values = np.asarray(values, dtype=np.float64).reshape(-1, 2) if np.size(values) else np.empty((0, 2))
+    return _finite(name, values, values.shape)
+
+
+def _finite(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    values = np.asarray(values, dtype=np.float64)
+    if values.shape != shape:
+        raise ValueError(f"{name} of shape {values.shape}: expected {shape}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{name}: a number is not finite")
+    return values
