@@ -15,7 +15,7 @@ from wfluid.grid import Grid
 from wfluid.kernels import krylov, relaxation, sources, viscosity
 from wfluid.kernels.cells import Layout, Real
 from wfluid.kernels.strips import alone, together
-from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve
+from wfluid.linear import JUMP_LIMIT, LinearSystem, Residual, Solve, conjugate_gradients
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, vector
@@ -177,7 +177,7 @@ class CoupledDiffusion:
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.how = sweeps
         elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:
-            self.how = Solve("conjugate gradients", ITERATION_LIMIT, tolerance)
+            self.how = conjugate_gradients(tolerance)
         else:
             self.how = self.system.plan_cycles(tolerance)
         self.system.prepare(self.how)

@@ -44,8 +44,11 @@ class Fluid:
     pressure_cycles: int = 3
     """Multigrid cycles a projection: 3 leave 3e-4 of the divergence, 4 leave 1.4e-5."""
     diffusion_tolerance: float = 7e-3
-    """Part of a step's viscous change that a diffusion may leave undone, 1e-12 … 0.5: Chebyshev sweeps
+    """Part of a step's viscous change that a diffusion may leave undone, 1e-14 … 0.5: Chebyshev sweeps
     where few of them do, else two or more multigrid cycles."""
+    pressure_tolerance: float = 5e-4
+    """Part of a projection that may be left undone where drag jumps and it is solved to a tolerance instead
+    of by `pressure_cycles`, 1e-14 … 0.5."""
     sweeps: int = 50
     """Jacobi sweeps a solve, with solver="jacobi"."""
 
@@ -70,8 +73,9 @@ class Fluid:
         for name in ("pressure_cycles", "sweeps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) >= 1):
                 raise ValueError(f"{name} {getattr(self, name)}: expected a whole number from 1 on")
-        if not 1e-12 <= self.diffusion_tolerance <= 0.5:
-            raise ValueError(f"diffusion_tolerance {self.diffusion_tolerance}: expected 1e-12 … 0.5")
+        for name in ("diffusion_tolerance", "pressure_tolerance"):
+            if not 1e-14 <= getattr(self, name) <= 0.5:
+                raise ValueError(f"{name} {getattr(self, name)}: expected 1e-14 … 0.5")
 
     @property
     def density_names(self) -> tuple[str, ...]:

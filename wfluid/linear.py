@@ -8,6 +8,7 @@ coefficients jump and cycles alone would stall. On the coarsest level a stored i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,7 +30,11 @@ JUMP_LIMIT = 10.0
 """Jump of the coefficients within a few cells up to which cycles alone converge as for smooth ones."""
 
 ITERATION_LIMIT = 60
-"""Most iterations of conjugate gradients: tens at contrasts of 1e4, so that more will not help."""
+"""Most iterations of conjugate gradients to `USUAL_TOLERANCE`: tens at contrasts of 1e4, so that more will
+not help."""
+
+USUAL_TOLERANCE = 5e-4
+"""About what three cycles leave."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,12 @@ class Residual:
         """||b - A x|| / (||b|| + ||A|| ||x||), which rounding keeps above about 1e-7 in float32."""
         whole = self.norm_b + self.norm_ax
         return self.norm / whole if whole > 0 else 0.0
+
+
+def conjugate_gradients(tolerance: float) -> Solve:
+    """Conjugate gradients to a tolerance, with as many iterations at most as its digits ask for."""
+    digits = max(1.0, math.log(tolerance) / math.log(USUAL_TOLERANCE))
+    return Solve("conjugate gradients", math.ceil(ITERATION_LIMIT * digits), tolerance)
 
 
 class LinearSystem:

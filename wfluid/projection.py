@@ -11,13 +11,10 @@ from wfluid.fluid import Fluid
 from wfluid.grid import Grid
 from wfluid.kernels import projection, projection_adjoint, relaxation, viscosity
 from wfluid.kernels.cells import Layout, Real
-from wfluid.linear import ITERATION_LIMIT, JUMP_LIMIT, LinearSystem, Residual, Solve, largest
+from wfluid.linear import JUMP_LIMIT, LinearSystem, Residual, Solve, conjugate_gradients, largest
 from wfluid.medium import Medium
 from wfluid.multigrid import Points, hierarchy
 from wfluid.state import Vector, field, vector
-
-PRESSURE_TOLERANCE = 5e-4
-"""Of conjugate gradients; leaves about as much of the divergence as three cycles."""
 
 
 class Projection:
@@ -50,7 +47,7 @@ class Projection:
         """Choose the solve for the medium's drag and steps of dt. `prepare` must follow."""
         if self.medium and self.fluid.solver != "jacobi":
             if self.medium.drag_jump(dt) > JUMP_LIMIT:
-                self.how = Solve("conjugate gradients", ITERATION_LIMIT, PRESSURE_TOLERANCE)
+                self.how = conjugate_gradients(self.fluid.pressure_tolerance)
             else:
                 self.how = Solve("multigrid", self.fluid.pressure_cycles)
             self.system.prepare(self.how)

@@ -12,7 +12,7 @@ import warp as wp
 
 from wfluid.fluid import Fluid
 from wfluid.forces import Force
-from wfluid.linear import ITERATION_LIMIT
+from wfluid.linear import conjugate_gradients
 from wfluid.solver import Solver, SolveReport
 from wfluid.state import State
 from wfluid.timeline import Timeline
@@ -102,7 +102,8 @@ def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
         if pressure.method == "jacobi":
             return f"{left} sweeps; set solver (--solver) to multigrid"
         return f"{left} iterations; soften the edges of the freeze mask"
-    if diffusion.method == "conjugate gradients" and diffusion.iterations == ITERATION_LIMIT:
+    most = conjugate_gradients(fluid.diffusion_tolerance).iterations
+    if diffusion.method == "conjugate gradients" and diffusion.iterations == most:
         return (
             f"the diffusion left {diffusion.relative:.1e} of its change after "
             f"{diffusion.iterations} iterations; "
