@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 
 import numpy as np
 import warp as wp
@@ -18,53 +17,65 @@ from wfluid.walls import Walls
 _NUMBERS = 8
 """Of a blob on the device: center (2), radius, push (2), turn, swell, amount."""
 
+_FIELDS = 2
+"""Fields that moments are taken of: a velocity has two."""
+
+
+def blob_of(row: Sequence[float]) -> Blob:
+    """The numbers of one Gaussian, or the gradients with respect to them, in words."""
+    center_x, center_y, radius, push_x, push_y, turn, swell, amount = map(float, row)
+    return Blob((center_x, center_y), radius, (push_x, push_y), turn, swell, amount)
+
 
 class Blobs:
-    """A number of Gaussians whose places, sizes and strengths change from step to step."""
+    """A number of Gaussians whose places, sizes and strengths change from step to step.
+
+    What they are in a step is a row of numbers and one of boxes, which `row` finds and `bind` says where on
+    the device to look for.
+    """
 
     def __init__(self, count: int, grid: Grid, walls: Walls, device: wp.Device, gradients: bool = False):
-        self.count, self.grid, self.device, self.layout = count, grid, device, Layout(grid.nx, grid.ny)
+        self.count, self.device, self.layout = count, device, Layout(grid.nx, grid.ny)
+        self.numbers, self.boxes = _NUMBERS * count, 4 * count
+        self.moments = _FIELDS * forces_adjoint.MOMENTS * count if gradients else 0
         self._x = _Axis(count, grid.nx, grid.hx, grid.width * walls.periodic[0], device)
         self._y = _Axis(count, grid.ny, grid.hy, grid.height * walls.periodic[1], device)
-        self._gradients = gradients
         if gradients:
             self._sums = wp.zeros(forces_adjoint.ORDERS * count * grid.ny, dtype=Real, device=device)
-        self._allocate()
 
-    def another(self) -> Blobs:
-        """The same for another step: numbers of its own, working memory in common."""
-        other = copy(self)
-        other._allocate()
-        return other
+    numbers: int
+    """Entries of a row of numbers."""
+    boxes: int
+    """Entries of a row of boxes."""
+    moments: int
+    """Entries of a row of moments, which gradients are made of."""
 
-    def _allocate(self) -> None:
+    def bind(self, numbers: wp.array, boxes: wp.array, moments: wp.array) -> None:
+        """Read and write from now on in these arrays."""
         count = self.count
-        self._numbers = wp.zeros(_NUMBERS * count, dtype=Real, device=self.device)
         self._center_x, self._center_y, self._radius, *self._strengths = (
-            self._numbers[n * count : (n + 1) * count] for n in range(_NUMBERS)
+            numbers[n * count : (n + 1) * count] for n in range(_NUMBERS)
         )
-        self._boxes: Indices = wp.zeros(4 * count, dtype=wp.int32, device=self.device)
-        self._table = np.zeros((_NUMBERS, count))
-        if self._gradients:
-            size = forces_adjoint.MOMENTS * count
-            self._moments = [wp.zeros(size, dtype=Real, device=self.device) for _ in range(2)]
+        self._boxes: Indices = boxes
+        size = self.moments // _FIELDS
+        self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS if size else 0)]
 
-    def set(self, blobs: Sequence[Blob], live: Sequence[bool] = ()) -> None:
-        """Put what they do in a step on the device.
+    def row(self, blobs: Sequence[Blob], live: Sequence[bool] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers and the boxes of what they do in a step.
 
         Those that are `live` act even where their strengths are 0, for the gradients with respect to these.
         """
         rows = [(*b.center, b.radius, *b.push, b.turn, b.swell, b.amount) for b in blobs]
-        self._table = np.array(rows).reshape(self.count, _NUMBERS).T
-        self._numbers.assign(np.ascontiguousarray(self._table).ravel())
-        acting = np.any(self._table[3:], axis=0)
-        self._boxes.assign(self._boxed(acting | np.array(live) if live else acting).ravel())
+        table = np.array(rows).reshape(self.count, _NUMBERS).T
+        acting = np.any(table[3:], axis=0)
+        boxes = self._boxed(table, acting | np.array(live) if live else acting)
+        return np.ascontiguousarray(table).ravel(), boxes.ravel()
 
-    def _boxed(self, acting: np.ndarray) -> np.ndarray:
+    def _boxed(self, table: np.ndarray, acting: np.ndarray) -> np.ndarray:
         """The box of each, (blobs, 4), empty where it does not act: cells with a face or centre in reach."""
         boxes = np.zeros((self.count, 4), dtype=np.int32)
-        reach = float(forces.CUT) * self._table[2]
-        for n, (axis, center) in enumerate(zip((self._x, self._y), self._table, strict=False)):
+        reach = float(forces.CUT) * table[2]
+        for n, (axis, center) in enumerate(zip((self._x, self._y), table, strict=False)):
             low, high = 0, axis.points
             if not axis.period:
                 low = np.clip(np.floor((center - reach) / axis.h) - 1, 0, axis.points)
@@ -121,35 +132,45 @@ class Blobs:
         inputs = [self._sums, g_y, r_y, self._boxes, ny, self._y.layout.pitch]
         forces_adjoint.moments.launch(count, device, inputs, [self._moments[slot]])
 
-    def push_gradient(self) -> list[Blob]:
-        """The gradients with respect to all numbers that the last `measure_push` found."""
-        _, _, sigma, px, py, turn, *_ = self._table
-        u, v = (_Moments(m, self.count) for m in self._moments)
+    def push_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradients with respect to rows of numbers, from these and the moments `measure_push` took."""
+        table, (u, v) = self._tables(numbers, moments)
+        sigma, px, py, turn = table[2:6]
         # the velocity gained is (px - turn r_y) g on x-faces and (py + turn r_x) g on y-faces
-        center_x = (px * u(1, 0) - turn * u(1, 1) + py * v(1, 0) + turn * (v(2, 0) - v(0, 0))) / sigma
-        center_y = (px * u(0, 1) - turn * (u(0, 2) - u(0, 0)) + py * v(0, 1) + turn * v(1, 1)) / sigma
+        out = np.zeros_like(table)
+        out[0] = (px * u(1, 0) - turn * u(1, 1) + py * v(1, 0) + turn * (v(2, 0) - v(0, 0))) / sigma
+        out[1] = (px * u(0, 1) - turn * (u(0, 2) - u(0, 0)) + py * v(0, 1) + turn * v(1, 1)) / sigma
         around = v(3, 0) + v(1, 2) - v(1, 0) - (u(2, 1) + u(0, 3) - u(0, 1))
-        radius = (px * u.square + py * v.square + turn * around) / sigma
-        columns = center_x, center_y, radius, u(0, 0), v(0, 0), v(1, 0) - u(0, 1)
-        return [Blob((cx, cy), r, push=(x, y), turn=w) for cx, cy, r, x, y, w in zip(*columns, strict=True)]
+        out[2] = (px * u.square + py * v.square + turn * around) / sigma
+        out[3], out[4], out[5] = u(0, 0), v(0, 0), v(1, 0) - u(0, 1)
+        return out
 
-    def swell_gradient(self) -> list[Blob]:
-        """The same for `swell`, after `measure_centres`."""
-        sigma, rate = self._table[2], self._table[6]
-        s = _Moments(self._moments[0], self.count)
+    def swell_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The same for `swell`, from what `measure_centres` took."""
+        table, (s, _) = self._tables(numbers, moments)
+        sigma, rate = table[2], table[6]
         # the divergence is rate (1 - r^2 / 2) g
-        center_x = rate * (2 * s(1, 0) - (s(3, 0) + s(1, 2)) / 2) / sigma
-        center_y = rate * (2 * s(0, 1) - (s(2, 1) + s(0, 3)) / 2) / sigma
-        radius = rate * (2 * s.square - (s(4, 0) + 2 * s(2, 2) + s(0, 4)) / 2) / sigma
-        columns = center_x, center_y, radius, s(0, 0) - s.square / 2
-        return [Blob((cx, cy), r, swell=a) for cx, cy, r, a in zip(*columns, strict=True)]
+        out = np.zeros_like(table)
+        out[0] = rate * (2 * s(1, 0) - (s(3, 0) + s(1, 2)) / 2) / sigma
+        out[1] = rate * (2 * s(0, 1) - (s(2, 1) + s(0, 3)) / 2) / sigma
+        out[2] = rate * (2 * s.square - (s(4, 0) + 2 * s(2, 2) + s(0, 4)) / 2) / sigma
+        out[6] = s(0, 0) - s.square / 2
+        return out
 
-    def pour_gradient(self) -> list[Blob]:
-        """The same for `pour`, after `measure_centres`."""
-        sigma, amount = self._table[2], self._table[7]
-        s = _Moments(self._moments[0], self.count)
-        columns = amount * s(1, 0) / sigma, amount * s(0, 1) / sigma, amount * s.square / sigma, s(0, 0)
-        return [Blob((cx, cy), r, amount=a) for cx, cy, r, a in zip(*columns, strict=True)]
+    def pour_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The same for `pour`, from what `measure_centres` took."""
+        table, (s, _) = self._tables(numbers, moments)
+        sigma, amount = table[2], table[7]
+        out = np.zeros_like(table)
+        out[:3] = amount * s(1, 0) / sigma, amount * s(0, 1) / sigma, amount * s.square / sigma
+        out[7] = s(0, 0)
+        return out
+
+    def _tables(self, numbers: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, list[_Moments]]:
+        """Rows (steps, …) as numbers by kind (8, steps, blobs), and the moments of either field."""
+        table = numbers.reshape(len(numbers), _NUMBERS, self.count).swapaxes(0, 1).astype(np.float64)
+        fields = moments.reshape(len(moments), _FIELDS, self.count, -1).astype(np.float64)
+        return table, [_Moments(fields[:, n]) for n in range(_FIELDS)]
 
     def _profile(self, faces: bool = False) -> tuple[Vector, Vector]:
         """Compute, and return, distances and Gaussians of both axes, at faces or at centres."""
@@ -170,16 +191,15 @@ class _Axis:
 
 
 class _Moments:
-    """M_ab of every Gaussian (`kernels/forces_adjoint.py`), in double precision."""
+    """M_ab of every Gaussian in every step (`kernels/forces_adjoint.py`), (steps, blobs)."""
 
-    def __init__(self, values: wp.array, count: int):
-        self._table = values.numpy().astype(np.float64).reshape(count, -1).T
-        orders = range(forces_adjoint.ORDERS)
+    def __init__(self, values: np.ndarray):
+        self._values, orders = values, range(forces_adjoint.ORDERS)
         self._places = [(a, b) for a in orders for b in orders if a + b < len(orders)]
 
     def __call__(self, a: int, b: int) -> np.ndarray:
-        """Of r_x^a r_y^b g, one a Gaussian."""
-        return self._table[self._places.index((a, b))]
+        """Of r_x^a r_y^b g."""
+        return self._values[..., self._places.index((a, b))]
 
     @property
     def square(self) -> np.ndarray:

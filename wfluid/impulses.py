@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from copy import copy
 
 import numpy as np
 import warp as wp
 
 from wfluid.fluid import Fluid
-from wfluid.forces import FORCE_LIMIT, STEP_GROWTH, Blob, BlobForce, Buoyancy, FieldForce, Force, Growth
+from wfluid.forces import FORCE_LIMIT, STEP_GROWTH, BlobForce, Buoyancy, FieldForce, Force, Growth
 from wfluid.grid import Grid
 from wfluid.kernels import forces as kernels
 from wfluid.kernels import forces_adjoint, krylov
@@ -26,9 +25,6 @@ STEP_LIMIT = 10.0
 
 _STEP = 5
 """Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
-
-Bar = Blob | list[float]
-"""The gradient with respect to what one force does in a step: its Gaussian's numbers, or its impulses'."""
 
 
 class Impulses:
@@ -57,27 +53,47 @@ class Impulses:
         self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
         self._lifted = field(self.layout, device) if self._lifts and gradients else None
         self._rows = wp.zeros(2 * grid.ny, dtype=Real, device=device)
-        self._allocate()
+        self._lay_out()
 
-    prescribed: float
+    prescribed: float = 0.0
     """Sum of the largest divergences that the last step's growths prescribe [1/s]."""
+    numbers: wp.array
+    """All numbers of a step, on the device."""
+    boxes: wp.array
+    """All boxes of a step, on the device."""
+    bars: wp.array
+    """What gradients are made of: impulses' and moments."""
 
-    def another(self) -> Impulses:
-        """The same for another step: numbers of its own, working memory in common."""
-        other = copy(self)
-        for name in ("_pushes", "_growths", "_pourings"):
-            setattr(other, name, [group.another() for group in getattr(self, name)])
-        other._allocate()
-        return other
-
-    def _allocate(self) -> None:
+    def _lay_out(self) -> None:
+        """Allocate the arrays, and tell everything what parts of them are its own."""
+        self._groups = [*self._pushes, *self._growths]
+        blobs = [group.blobs for group in self._groups] + [p.blobs for p in self._pourings if p.blobs]
         impulses = len(self._fields) + 2 * len(self._lifts)
-        self._numbers = wp.zeros(_STEP + impulses, dtype=Real, device=self.device)
-        numbers = _entries(self._numbers)
-        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = numbers[:_STEP]
-        self._impulses = numbers[_STEP:]
-        self._impulses_bar = wp.zeros(impulses, dtype=Real, device=self.device)
-        self.prescribed = 0.0
+        painted = sum(pouring.painted for pouring in self._pourings)
+        begin = _STEP + impulses + painted
+        self.numbers, self.bars = (
+            wp.zeros(size, dtype=Real, device=self.device)
+            for size in (begin + sum(b.numbers for b in blobs), begin + sum(b.moments for b in blobs))
+        )
+        self.boxes = wp.zeros(sum(b.boxes for b in blobs), dtype=wp.int32, device=self.device)
+        step = _entries(self.numbers[:_STEP])
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = step
+        self._lone = slice(_STEP, _STEP + impulses)
+        self._impulses, self._impulses_bar = (_entries(a[self._lone]) for a in (self.numbers, self.bars))
+        at = self._lone.stop
+        self._painted: list[slice] = []
+        for pouring in self._pourings:
+            self._painted.append(slice(at, at + pouring.painted))
+            pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
+            at += pouring.painted
+        number, moment, box = at, at, 0
+        self._parts: dict[int, tuple[slice, slice]] = {}
+        for part in blobs:
+            numbers, moments = slice(number, number + part.numbers), slice(moment, moment + part.moments)
+            boxes = slice(box, box + part.boxes)
+            number, moment, box = numbers.stop, moments.stop, boxes.stop
+            part.bind(self.numbers[numbers], self.boxes[boxes], self.bars[moments])
+            self._parts[id(part)] = numbers, moments
 
     @staticmethod
     def key(forces: Sequence[Force]) -> tuple:
@@ -111,7 +127,22 @@ class Impulses:
         kept: float = 0.0,
         live: bool = False,
     ) -> None:
-        """Put a step of dt, in which forces and the fluid's sources act from t to `until`, on the device.
+        """Put a step on the device: what `row` finds."""
+        numbers, boxes = self.row(forces, fluid, t, dt, until, kept, live)
+        self.numbers.assign(numbers)
+        self.boxes.assign(boxes)
+
+    def row(
+        self,
+        forces: Sequence[Force],
+        fluid: Fluid,
+        t: float,
+        dt: float,
+        until: float,
+        kept: float = 0.0,
+        live: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers and boxes of a step of dt, in which forces and the fluid's sources act from t to `until`.
 
         `kept` is the part of the last step's pressure that is taken for a first guess; none where
         divergence is prescribed. With `live` forces count as acting even where their strengths are 0.
@@ -128,9 +159,6 @@ class Impulses:
                 )
             gained = max(blob.gained, abs(blob.swell) * blob.radius)
             _check(f"the force at {blob.center}", gained, t, until)
-        for group in (*self._pushes, *self._growths):
-            alive = [live and forces[n].envelope.acts(t, until) for n in group.members]
-            group.blobs.set([blobs[n] for n in group.members], alive)
         self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
         kept = 0.0 if self.prescribed else kept
         hx, hy = self.grid.hx, self.grid.hy
@@ -143,9 +171,16 @@ class Impulses:
             impulse = forces[n].envelope.integral(t, until)
             _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
             numbers += [impulse * component for component in forces[n].vector]
-        self._numbers.assign(np.array(numbers))
-        for pouring, density in zip(self._pourings, fluid.densities, strict=True):
-            pouring.set(density, t, until, live)
+        pourings = list(zip(self._pourings, fluid.densities, strict=True))
+        for pouring, density in pourings:
+            numbers += pouring.impulses(density, t, until)
+        rows = []
+        for group in self._groups:
+            alive = [live and forces[n].envelope.acts(t, until) for n in group.members]
+            rows.append(group.blobs.row([blobs[n] for n in group.members], alive))
+        rows += [pouring.row(density, t, until, live) for pouring, density in pourings if pouring.blobs]
+        boxes = [np.empty(0, dtype=np.int32), *(boxes for _, boxes in rows)]
+        return np.concatenate([numbers, *(row for row, _ in rows)]), np.concatenate(boxes)
 
     def push(self, state: State, out: Vector) -> None:
         """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
@@ -184,7 +219,7 @@ class Impulses:
 
         `velocity_bar` comes with zeros for ghosts; what densities lifted is added to `rho_bar`.
         """
-        bars = iter(_entries(self._impulses_bar))
+        bars = iter(self._impulses_bar)
         for _, fields in self._fields:
             self._multiply(velocity_bar, fields, next(bars))
         for density, f_bar, before, impulse in self._lifting(velocity_bar):
@@ -215,19 +250,30 @@ class Impulses:
         """The transpose of `pour` with respect to the sources: launches only."""
         self._pourings[density].adjoint(rho_bar)
 
-    def gradients(self) -> dict[int, Bar]:
-        """What the last transposes found for each force, by its number."""
-        bars: dict[int, Bar] = {}
-        for group in (*self._pushes, *self._growths):
-            bars.update(zip(group.members, group.gradient(), strict=True))
-        members = [n for n, _ in self._fields] + [n for n, _ in self._lifts for _ in range(2)]
-        for n, bar in zip(members, self._impulses_bar.numpy(), strict=True):
-            bars.setdefault(n, []).append(float(bar))
-        return bars
+    def gradients(self, numbers: np.ndarray, bars: np.ndarray) -> dict[int, np.ndarray]:
+        """The gradients with respect to what each force does, from rows of `numbers` and `bars`, one a step.
 
-    def source_gradients(self) -> list[dict[int, Bar]]:
+        By the force's number, (steps, n): of a Gaussian the numbers that `blobs.blob_of` knows, of a field
+        its integrals, of a buoyancy its two impulses.
+        """
+        found: dict[int, np.ndarray] = {}
+        for group in self._groups:
+            own, moments = self._parts[id(group.blobs)]
+            table = group.gradient(numbers[:, own], bars[:, moments])
+            found.update((n, table[:, :, place].T) for place, n in enumerate(group.members))
+        members = [n for n, _ in self._fields] + [n for n, _ in self._lifts for _ in range(2)]
+        for n in dict.fromkeys(members):
+            columns = [place for place, member in enumerate(members) if member == n]
+            found[n] = bars[:, self._lone][:, columns].astype(np.float64)
+        return found
+
+    def source_gradients(self, numbers: np.ndarray, bars: np.ndarray) -> list[dict[int, np.ndarray]]:
         """The same for the sources of each density."""
-        return [pouring.gradients() for pouring in self._pourings]
+        found = []
+        for pouring, painted in zip(self._pourings, self._painted, strict=True):
+            own, moments = self._parts[id(pouring.blobs)] if pouring.blobs else (slice(0), slice(0))
+            found.append(pouring.gradients(numbers[:, own], bars[:, moments], bars[:, painted]))
+        return found
 
 
 _Groups = list[tuple[Painted | None, list[int]]]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from typing import Self
 
+import numpy as np
 import warp as wp
 
 from wfluid.blobs import Blobs
-from wfluid.forces import Blob
 from wfluid.grid import Grid
 from wfluid.kernels import forces, forces_adjoint, krylov, sources
 from wfluid.kernels.cells import Layout, Real
@@ -39,12 +37,6 @@ class _Gaussians:
             from_numpy(weight.on(grid), self._weights, self.layout)
             Ghosts(self.layout, walls.centre_rules(), device).fill(self._weights)
 
-    def another(self) -> Self:
-        """The same for another step: numbers of its own, working memory in common."""
-        other = copy(self)
-        other.blobs = self.blobs.another()
-        return other
-
 
 class Pushes(_Gaussians):
     """Gaussian forces with one weight."""
@@ -73,9 +65,9 @@ class Pushes(_Gaussians):
                 forces_adjoint.weighted.launch(self.layout, self.device, inputs, [gained])
         self.blobs.measure_push(self._gained or velocity_bar)
 
-    def gradient(self) -> list[Blob]:
-        """What the last `adjoint` found, one a force."""
-        return self.blobs.push_gradient()
+    def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
+        return self.blobs.push_gradient(numbers, moments)
 
 
 class Growths(_Gaussians):
@@ -115,6 +107,6 @@ class Growths(_Gaussians):
             sources.weigh.launch(self.layout, self.device, [self._weights], [s_bar])
         self.blobs.measure_centres(s_bar)
 
-    def gradient(self) -> list[Blob]:
-        """What the last `adjoint` found, one a force."""
-        return self.blobs.swell_gradient()
+    def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
+        return self.blobs.swell_gradient(numbers, moments)

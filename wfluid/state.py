@@ -88,12 +88,16 @@ class State:
         ]
 
     @property
-    def gradient(self) -> State:
-        """The arrays that hold the gradients with respect to these; without ghosts."""
+    def particles(self) -> list[wp.array]:
+        """Where points are along x and y."""
+        return [self.p_x, self.p_y]
+
+    def view(self) -> State:
+        """The same memory in arrays of its own, which may have other gradients."""
         u, v, d_x, d_y, q, p_x, p_y = (
-            a.grad for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
+            a[:] for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
         )
-        return State(self.grid, u, v, d_x, d_y, q, tuple(rho.grad for rho in self.rho), p_x, p_y)
+        return State(self.grid, u, v, d_x, d_y, q, tuple(rho[:] for rho in self.rho), p_x, p_y)
 
     def take_gradient(self, bar: State) -> None:
         """Let the arrays of `bar` hold the gradients."""

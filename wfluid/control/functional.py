@@ -13,10 +13,11 @@ more runs. It is right to rounding; with respect to viscosity, to the residual o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wfluid.blobs import blob_of
 from wfluid.control.objectives import (
     Effort,
     Objective,
@@ -29,10 +30,11 @@ from wfluid.control.objectives import (
 )
 from wfluid.control.recording import Recording, Reversed
 from wfluid.control.variables import VELOCITY, VISCOSITY, Free, Setup, Variables
+from wfluid.density import Source
 from wfluid.device import open_device
 from wfluid.diffusion import SURE_TOLERANCE
 from wfluid.fluid import Fluid
-from wfluid.forces import Force, Group, flat
+from wfluid.forces import BlobForce, Force, Group, flat
 from wfluid.grid import Grid
 from wfluid.stages import Stages
 from wfluid.state import State
@@ -179,21 +181,23 @@ class Functional:
             gradients[VISCOSITY] = np.asarray(found.viscosity.sum())
         self._add_slopes(gradients, "forces", self._setup.forces, found.forces)
         for d, density in enumerate(self._setup.fluid.densities):
-            bars = [step[d] for step in found.sources]
-            self._add_slopes(gradients, f"fluid.densities[{d}].sources", density.sources, bars)
+            self._add_slopes(gradients, f"fluid.densities[{d}].sources", density.sources, found.sources[d])
         return gradients
 
-    def _add_slopes(self, gradients: dict, where: str, forces: Sequence, steps: Sequence) -> None:
+    def _add_slopes(
+        self, gradients: dict, where: str, forces: Sequence, found: Mapping[int, np.ndarray]
+    ) -> None:
         """Sum over the steps what each force's own numbers have for gradients."""
         for n, force in enumerate(forces):
             name = f"{where}[{n}]"
             if not self.variables.has(name):
                 continue
-            for step, bars in enumerate(steps):
+            for step, row in enumerate(found[n]):
                 start, end = self._recording.time_of(step), self._recording.time_of(step + 1)
                 if not force.envelope.acts(start, end):
                     continue
-                for key, slope in force.pull_back(start, end, bars[n]).items():
+                bar = blob_of(row) if isinstance(force, BlobForce | Source) else row
+                for key, slope in force.pull_back(start, end, bar).items():
                     gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
 
     def _step_of(self, t: float) -> int:

@@ -12,7 +12,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,6 @@ import warp as wp
 
 from wfluid.kernels import krylov, misfit, transport_adjoint
 from wfluid.kernels.cells import Real
-from wfluid.kernels.strips import alone
 from wfluid.painted import Painted
 from wfluid.stages import Stages
 from wfluid.state import State, from_numpy, vector
@@ -190,11 +188,6 @@ class Term(ABC):
     def adjoint(self, state: State, bar: State) -> None:
         """Add its gradient with respect to a state to `bar`: launches only."""
 
-    def record(self, tape: wp.Tape, state: State) -> None:
-        """Find its value, and have the tape add its gradient to the state's."""
-        self.measure(state)
-        tape.record_func(partial(self.adjoint, state, state.gradient), state.arrays)
-
 
 @dataclass(frozen=True, eq=False)
 class MapMisfit(StateObjective):
@@ -339,32 +332,21 @@ class _Program(Term):
         self._value = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
 
     def measure(self, state: State) -> None:
-        """Run the program."""
+        """Run the program on a tape of its own."""
         self._value.zero_()
-        p_x, p_y = (p[self._particles] for p in (state.p_x, state.p_y))
-        self._program(replace(state, p_x=p_x, p_y=p_y), self._value)
+        p_x, p_y = (p[self._particles] for p in state.particles)
+        self._tape = wp.Tape()
+        with self._tape:
+            self._program(replace(state, p_x=p_x, p_y=p_y), self._value)
 
     def value(self) -> float:
         """Times the weight."""
         return self._weight * float(self._value.numpy()[0])
 
     def adjoint(self, state: State, bar: State) -> None:
-        """Nothing beside what Warp's own tape does."""
-
-    def record(self, tape: wp.Tape, state: State) -> None:
-        """Run the program on a tape, which is then played back as a part of the other."""
-        own = wp.Tape()
-
-        def forward() -> None:
-            with own:
-                self.measure(state)
-
-        def backward() -> None:
-            self._value.grad.fill_(self._weight)
-            own.backward()
-
-        alone(forward)
-        tape.record_func(partial(alone, backward), [self._value])
+        """Play the tape back: the state's arrays know their gradients."""
+        self._value.grad.fill_(self._weight)
+        self._tape.backward()
 
 
 def places_of(name: str, values: Any) -> np.ndarray:

@@ -1,17 +1,19 @@
-"""A run that can be gone back through: its states, a tape for each segment of its steps, graphs of both ways.
+"""A run that can be gone back through.
 
-A segment's steps are recorded once on a `wp.Tape`, one entry a step (`adjoint.StepAdjoint`), and the
-launches of both directions captured as a graph each; afterwards graphs are replayed, whatever numbers the
-run has, for time, envelopes and forces' numbers are read from device memory. Only a solve that would go
-otherwise (more cycles for a stiffer fluid) records anew. With a cap on memory all segments take turns in
-the same states (`schedule`).
+A step is recorded on a `wp.Tape` as one entry (`adjoint.StepAdjoint`) and captured in two graphs: a loop of
+steps forward, and a loop of the tape played back. Both find in device memory which step they are at
+(`kernels/rows.py`): the state it begins with, the numbers of what acts, where to leave what they find. So
+they are captured once, in the time of one step, for runs of any length and whatever their numbers. Only a
+solve that would go otherwise (more cycles for a stiffer fluid) has them captured anew.
+
+With a cap on memory, segments of the run take turns in the same tables (`schedule`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -19,18 +21,22 @@ import warp as wp
 
 from wfluid.adjoint import StepAdjoint
 from wfluid.control.objectives import Term
-from wfluid.control.schedule import Advance, Restore, Schedule, Store, even_segments, least_room
+from wfluid.control.schedule import Advance, Restore, Reverse, Schedule, Store, even_segments, least_room
+from wfluid.control.tables import Counter, Table
 from wfluid.control.variables import Setup
 from wfluid.device import Replay, exclusive, load_kernels
-from wfluid.impulses import Bar, Impulses
+from wfluid.impulses import Impulses
 from wfluid.kernels import misfit
 from wfluid.kernels.cells import Real
-from wfluid.kernels.strips import STRIP
+from wfluid.kernels.strips import STRIP, repeat_while
 from wfluid.stages import Stages
-from wfluid.state import State, field, from_numpy, to_numpy
+from wfluid.state import State, from_numpy, to_numpy
 from wfluid.timeline import Timeline
 
 MEGABYTE = 2**20
+
+WORKING_STATES = 4
+"""Before and after a step, and the gradients with respect to both."""
 
 
 @dataclass(frozen=True)
@@ -41,14 +47,17 @@ class Reversed:
     """With respect to the velocity at the beginning, (2, ny, nx)."""
     viscosity: np.ndarray
     """With respect to the viscosity at centres, (ny, nx); 0 unless it was asked for."""
-    forces: list[Mapping[int, Bar]]
-    """For each step the gradients with respect to what each force does in it."""
-    sources: list[list[Mapping[int, Bar]]]
+    forces: Mapping[int, np.ndarray]
+    """With respect to what each force does in every step (`Impulses.gradients`)."""
+    sources: list[Mapping[int, np.ndarray]]
     """The same for the sources of each density."""
 
 
 class Recording:
-    """A run of a timeline's steps from rest or a given velocity, ready to be replayed with other numbers.
+    """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
+
+    `terms` are objectives of the state after some steps. With `effort` half the squares of what forces add
+    count too.
 
     Raises:
         ValueError: a memory cap too small, with the least that works; a viscosity that depends on the time.
@@ -72,57 +81,57 @@ class Recording:
             )
         self.stages, self.timeline, self.device = stages, timeline, stages.device
         self.steps = (timeline.frames - 1) * timeline.steps_per_frame
-        self._terms, self._points, self._effort = terms, points, effort
-        grid, layout = stages.grid, stages.layout
-        self.compile_seconds = load_kernels(self.device)
-        self._adjoint = StepAdjoint(stages, of_viscosity, effort * grid.hx * grid.hy / timeline.dt)
+        self._terms, self._points = terms, points
+        self._term_replays: dict[Callable, Replay] = {}
+        grid, device = stages.grid, stages.device
+        self._effort = effort * grid.hx * grid.hy / timeline.dt
+        self.compile_seconds = load_kernels(device)
+        self._adjoint = StepAdjoint(stages, of_viscosity, self._effort)
         self._adjoint.set_step(timeline.dt)
         self.compile_seconds += self._adjoint.compile_seconds
-        self._pressure = None if stages.medium else field(layout, self.device)
-        self.schedule = self._planned(memory_mb)
-        slots = self.steps if self.schedule.keeps_all else max(e - s for s, e in self.schedule.segments)
-        self.states = [self._state() for _ in range(slots + 1)]
-        self._bars = [replace(self._state(), q=field(layout, self.device)) for _ in range(2)]
-        for slot, state in enumerate(self.states):
-            state.take_gradient(self._bars[slot % 2])
-        self._stored = (
-            {} if self.schedule.keeps_all else {s: self._state() for s, _ in self.schedule.segments}
+        self._before, self._after, self._bar, self._after_bar = (
+            State.at_rest(grid, device, len(stages.densities), len(points)) for _ in range(WORKING_STATES)
         )
-        first = Impulses(setup.forces, setup.fluid, grid, self.device, gradients=True)
-        self._impulses = [first, *(first.another() for _ in range(slots - 1))]
-        rows = 2 * grid.ny if effort else 0
-        self._efforts = [wp.zeros(rows, dtype=Real, device=self.device) for _ in range(slots)]
-        self._pull = [
-            tuple(wp.zeros(len(points), dtype=Real, device=self.device) for _ in range(2))
-            for _ in range(slots + 1)
-        ]
-        self._segments: dict[tuple, _Segment] = {}
-        self._pool = stages.helpers()
+        self._before.take_gradient(self._bar)
+        self._after.take_gradient(self._after_bar)
+        self._end = self._before.view()  # the same arrays for objectives, which add to what comes after
+        self._end.take_gradient(self._after_bar)
+        self.schedule = self._planned(memory_mb)
+        longest = max(end - start for start, end in self.schedule.segments)
+        rows = self.steps if self.schedule.keeps_all else longest
+        stored = 0 if self.schedule.keeps_all else len(self.schedule.segments)
+        self._states = [Table(a, rows + 1) for a in self._kept(self._before)]
+        self._stored = [Table(a, stored) for a in self._kept(self._before)]
+        self._impulses = Impulses(setup.forces, setup.fluid, grid, device, gradients=True)
+        self._numbers, self._boxes, self._bars = (
+            Table(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
+        )
+        self._pulls = [Table(p, rows + 1) for p in self._before.particles]
+        self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
+        self._square_rows = Table(self._squares, rows)
+        self._counter, self._pool = Counter(device), stages.helpers()
         self._preparation: Replay | None = None
-        self._swelled = [False] * self.steps
+        self._tapes: dict[int, wp.Tape] = {}
+        self._plan: tuple = ()
         self.set(setup)
 
     schedule: Schedule
     """How its segments are kept and stored."""
 
-    def _state(self) -> State:
-        """A state of zeros; where no pressure is kept from step to step, all share one."""
-        stages = self.stages
-        state = State.at_rest(stages.grid, self.device, len(stages.densities), len(self._points))
-        return state if self._pressure is None else replace(state, q=self._pressure)
+    def _kept(self, state: State) -> list[wp.array]:
+        """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
+        pressure = [state.q] if self.stages.medium else []
+        return [state.u, state.v, state.d_x, state.d_y, *state.rho, *pressure, *state.particles]
 
     def _planned(self, memory_mb: float | None) -> Schedule:
         breaks = [step for step, terms in self._terms.items() if terms]
         if memory_mb is None:
             return even_segments(self.steps, breaks=breaks)
-        fields = 4 + len(self.stages.densities) + (self._pressure is None)
-        each = (fields * self.stages.layout.size + 2 * len(self._points)) * wp.types.type_size_in_bytes(Real)
-        spare = 2  # the gradients
-        room = int(memory_mb * MEGABYTE / each) - spare
+        each = sum(a.capacity for a in self._kept(self._before)) / MEGABYTE
         try:
-            return even_segments(self.steps, room, breaks)
+            return even_segments(self.steps, int(memory_mb / each) - WORKING_STATES, breaks)
         except ValueError:
-            least = math.ceil(100 * (least_room(self.steps, breaks) + spare) * each / MEGABYTE) / 100
+            least = math.ceil(100 * (least_room(self.steps, breaks) + WORKING_STATES) * each) / 100
             raise ValueError(
                 f"memory_mb {memory_mb:g}: {self.steps} steps on {self.stages.grid.nx} x "
                 f"{self.stages.grid.ny} cells need at least {least:g}"
@@ -131,12 +140,8 @@ class Recording:
     @property
     def memory(self) -> int:
         """Bytes of all states and gradients."""
-        arrays = {
-            a.ptr: a.capacity
-            for state in (*self.states, *self._bars, *self._stored.values())
-            for a in state.arrays
-        }
-        return sum(arrays.values())
+        tables = sum(table.array.capacity for table in (*self._states, *self._stored))
+        return tables + WORKING_STATES * sum(a.capacity for a in self._kept(self._before))
 
     def time_of(self, step: int) -> float:
         """When a step begins [s]."""
@@ -149,40 +154,117 @@ class Recording:
         Raises:
             ValueError: a force beyond the limit.
         """
-        self._setup = setup
-        stages = self.stages
+        self._setup, stages, dt = setup, self.stages, self.timeline.dt
+        rows, swelled = [], False
+        for step in range(self.steps):
+            kept = stages.kept(dt, dt if step else 0.0, swelled)
+            t, until = self.time_of(step), self.time_of(step + 1)
+            rows.append(self._impulses.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
+            swelled = self._impulses.prescribed > 0
+        self._all_numbers, self._all_boxes = (np.stack(column) for column in zip(*rows, strict=True))
         stages.take_fluid(setup.fluid)
-        self._plan = stages.plan(self.time_of(1), self.timeline.dt, self._prepare)
+        plan = stages.plan(self.time_of(1), dt, self._prepare)
+        if plan != self._plan:
+            self._plan = plan
+            self._forward = Replay(self.device, self._record, self._pool)
+            self._backward = Replay(self.device, self._play_back, self._pool)
 
     def _prepare(self) -> None:
         if self._preparation is None:
             self._preparation = Replay(self.device, self.stages.follow_medium, self._pool)
         self._preparation.launch()
 
+    def _record(self) -> None:
+        """Steps in a loop, and one of them on a tape; launches only."""
+        tape, counter, impulses = wp.Tape(), self._counter, self._impulses
+        before, after = self._before, self._after
+
+        def step() -> None:
+            self._numbers.take(counter, impulses.numbers)
+            self._boxes.take(counter, impulses.boxes)
+            self.stages.advance(before, after, impulses)
+            back = partial(self._adjoint.reverse, before, impulses, self._after_bar, self._bar)
+            record(tape, back, before, after)
+            if self._squares.size:
+                self._measure_effort()
+                self._square_rows.give(counter, self._squares)
+            for table, f, to in zip(self._states, self._kept(after), self._kept(before), strict=True):
+                table.give(counter, f, ahead=1)
+                table.copy(f, to)
+            counter.count(1)
+
+        repeat_while(counter.going, step)
+        self._tapes[_strip()] = tape
+
+    def _measure_effort(self) -> None:
+        """Squares of what forces add to the velocity, summed along rows; launches only."""
+        state, layout = self._before, self.stages.layout
+        pushed = self.stages.push(state, self._impulses)
+        for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
+            inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
+            misfit.row_squares.launch(layout.ny, self.device, inputs, [self._squares])
+
+    def _play_back(self) -> None:
+        """The tape in a loop; launches only."""
+        repeat_while(self._counter.going, self._step_back)
+
+    def _step_back(self) -> None:
+        counter, impulses, before = self._counter, self._impulses, self._before
+        counter.count(-1)
+        self._numbers.take(counter, impulses.numbers)
+        self._boxes.take(counter, impulses.boxes)
+        for table, f in zip(self._states, self._kept(before), strict=True):
+            table.take(counter, f)
+        for pulls, bar in zip(self._pulls, self._after_bar.particles, strict=True):
+            pulls.add_to(counter, bar, ahead=1)
+        self._tapes[_strip()].backward()
+        self._bars.give(counter, impulses.bars)
+        bars = zip(self._states, self._kept(self._bar), self._kept(self._after_bar), strict=True)
+        for table, f, to in bars:
+            table.copy(f, to)
+
     def forward(self, looked_at: Sequence[int] = ()) -> dict[int, np.ndarray]:
         """Run it; where the particles are [longer side], (n, 2), after each of the steps `looked_at`."""
         self._begin()
         places: dict[int, np.ndarray] = {}
-        self._effort_value, self._term_value = 0.0, 0.0
+        self._value = 0.0
         for action in self.schedule.forward():
             self._do(action)
-            if isinstance(action, Advance):
-                base = self._base(action.start)
-                for step in looked_at:
-                    if action.start < step <= action.end:
-                        places[step] = self.states[base + step - action.start].points
-                for slot in range(base, base + action.end - action.start):
-                    self._effort_value += float(self._efforts[slot].numpy().sum(dtype=np.float64))
-                self._term_value += sum(term.value() for term in self._terms.get(action.end, ()))
+            if not isinstance(action, Advance):
+                continue
+            base = self._base(action.start)
+            length = action.end - action.start
+            for step in looked_at:
+                if action.start < step <= action.end:
+                    places[step] = self._places_at(base + step - action.start)
+            squares = self._square_rows.rows(base, base + length)
+            self._value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
+            for term in self._terms.get(action.end, ()):
+                self._replay(term, term.measure).launch()
+                self._value += term.value()
         return places
 
     @property
     def value(self) -> float:
         """What the last `forward` found of effort and of the terms."""
-        grid = self.stages.grid
-        return (
-            self._effort_value * self._effort * grid.hx * grid.hy / (2 * self.timeline.dt) + self._term_value
-        )
+        return self._value
+
+    def _places_at(self, row: int) -> np.ndarray:
+        columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
+        return np.stack(columns, axis=1) * (self.stages.grid.hx, self.stages.grid.hy)
+
+    def first_step_not_finite(self) -> int | None:
+        """The first step after which the fluid is not finite, run again; None where it stays so."""
+        self._begin()
+        for action in self.schedule.forward():
+            self._do(action)
+            if isinstance(action, Advance):
+                base = self._base(action.start)
+                for n in range(action.end - action.start):
+                    ends = [table.rows(base + n + 1, base + n + 2) for table in self._states]
+                    if not all(np.all(np.isfinite(end)) for end in ends):
+                        return action.start + n
+        return None
 
     def backward(
         self, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None = None
@@ -193,60 +275,72 @@ class Recording:
         With `watch`, which is told each step and the gradient before it, all is done singly, not replayed.
         """
         self._adjoint.mu_bar.zero_()
-        forces: list = [{}] * self.steps
-        sources: list = [[]] * self.steps
-        end_bar: State | None = None
+        for a in self._after_bar.arrays:
+            a.zero_()
+        bars = np.zeros((self.steps, self._bars.size))
         for action in self.schedule.backward():
-            if isinstance(action, Store | Restore | Advance):
+            if isinstance(action, Reverse):
+                self._reverse(action, pulls, watch)
+                base, length = self._base(action.start), action.end - action.start
+                bars[action.start : action.end] = self._bars.rows(base, base + length)
+            else:
                 self._do(action)
-                continue
-            start, end = action.start, action.end
-            base = self._base(start)
-            bar = self.states[base + end - start].gradient
-            if end_bar is None:
-                for a in bar.arrays:
-                    a.zero_()
-            elif end_bar.u is not bar.u:
-                _copy(end_bar, bar)
-            for slot in range(base, base + end - start + 1):
-                self._set_pull(slot, pulls.get(start + slot - base) if slot > base else None)
-            told = watch and (lambda step, bar, base=start: watch(base + step, bar))
-            self._segment(start, end).reverse(told)
-            for slot in range(base, base + end - start):
-                forces[start + slot - base] = self._impulses[slot].gradients()
-                sources[start + slot - base] = self._impulses[slot].source_gradients()
-            end_bar = self.states[base].gradient
-        layout = self.stages.layout
-        velocity = np.stack([to_numpy(f, layout).astype(np.float64) for f in (end_bar.u, end_bar.v)])
+        layout, numbers = self.stages.layout, self._all_numbers
+        velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
         self._adjoint.fold_viscosity()
-        return Reversed(velocity, to_numpy(self._adjoint.mu_bar, layout).astype(np.float64), forces, sources)
+        return Reversed(
+            np.stack(velocity),
+            to_numpy(self._adjoint.mu_bar, layout).astype(np.float64),
+            self._impulses.gradients(numbers, bars),
+            self._impulses.source_gradients(numbers, bars),
+        )
 
-    def first_step_not_finite(self) -> int | None:
-        """The first step after which the fluid is not finite, run again; None where it stays so."""
-        self._begin()
-        for action in self.schedule.forward():
-            self._do(action)
-            if isinstance(action, Advance):
-                base = self._base(action.start)
-                for slot in range(1, action.end - action.start + 1):
-                    arrays = self.states[base + slot].arrays
-                    if not all(np.all(np.isfinite(a.numpy())) for a in arrays):
-                        return action.start + slot - 1
-        return None
+    def _reverse(
+        self, action: Reverse, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None
+    ) -> None:
+        """Go back through one segment."""
+        start, length, base = action.start, action.end - action.start, self._base(action.start)
+        terms = self._terms.get(action.end, ())
+        if terms:
+            self._copy([table.row(base + length) for table in self._states], self._kept(self._before))
+        for term in terms:
+            self._replay(term, term.adjoint).launch()
+        scales = (self.stages.grid.hx, self.stages.grid.hy)
+        for axis, (table, h) in enumerate(zip(self._pulls, scales, strict=True)):
+            rows = np.zeros((length, table.size))
+            for n in range(length):
+                if start + n + 1 in pulls:
+                    rows[n] = pulls[start + n + 1][:, axis] * h
+            table.put(base + 1, rows)
+        if watch is None:
+            self._counter.set(base + length, base)
+            self._backward.launch()
+            return
+        for n in reversed(range(length)):
+            self._counter.set(base + n + 1, base + n)
+            self._step_back()
+            watch(start + n, self._bar)
+
+    def _replay(self, term: Term, work: Callable) -> Replay:
+        """Launches of a term, captured when first used."""
+        if work not in self._term_replays:
+            arguments = [self._end, self._after_bar] if work == term.adjoint else [self._end]
+            self._term_replays[work] = Replay(self.device, partial(work, *arguments), None)
+        return self._term_replays[work]
 
     def _base(self, start: int) -> int:
-        """The slot of a segment's first state."""
+        """The row of a segment's first state."""
         return start if self.schedule.keeps_all else 0
 
     @exclusive
     def _begin(self) -> None:
         """The state at the beginning: at rest but for the velocity."""
-        state, stages, grid = self.states[0], self.stages, self.stages.grid
+        state, stages, grid = self._before, self.stages, self.stages.grid
         for a in state.arrays:
             a.zero_()
         for density, rho in zip(stages.densities, state.rho, strict=True):
             density.begin(rho)
-        for p, column, h in zip((state.p_x, state.p_y), self._points.T, (grid.hx, grid.hy), strict=True):
+        for p, column, h in zip(state.particles, self._points.T, (grid.hx, grid.hy), strict=True):
             p.assign(column / h)
         pairs = zip(self._setup.velocity, (state.u, state.v), stages.velocity_ghosts, strict=True)
         for values, f, ghosts in pairs:
@@ -255,146 +349,41 @@ class Recording:
 
     def _do(self, action: Advance | Store | Restore) -> None:
         if isinstance(action, Advance):
-            self._put(action.start, action.end)
-            self._segment(action.start, action.end).advance()
-        elif isinstance(action, Store):
-            last = max((s for s in self._stored if s < action.step), default=None)
-            slot = 0 if last is None else action.step - last
-            _copy(self.states[slot], self._stored[action.step])
-            if slot:
-                _copy(self.states[slot], self.states[0])
-        else:
-            _copy(self._stored[action.step], self.states[0])
+            start, end, base = action.start, action.end, self._base(action.start)
+            self._put(start, end)
+            self._counter.set(base, base + end - start)
+            self._forward.launch()
+            return
+        number = [start for start, _ in self.schedule.segments].index(action.step)
+        stored = [table.row(number) for table in self._stored]
+        now = self._kept(self._before)
+        self._copy(*((now, stored) if isinstance(action, Store) else (stored, now)))
 
     @exclusive
     def _put(self, start: int, end: int) -> None:
-        """Put the numbers of some steps on the device."""
-        setup, dt, base = self._setup, self.timeline.dt, self._base(start)
-        for step in range(start, end):
-            impulses = self._impulses[base + step - start]
-            kept = self.stages.kept(dt, dt if step else 0.0, step > 0 and self._swelled[step - 1])
-            t, until = self.time_of(step), self.time_of(step + 1)
-            impulses.set(setup.forces, setup.fluid, t, dt, until, kept, live=True)
-            self._swelled[step] = impulses.prescribed > 0
-
-    def _set_pull(self, slot: int, pull: np.ndarray | None) -> None:
-        for axis, (array, h) in enumerate(
-            zip(self._pull[slot], (self.stages.grid.hx, self.stages.grid.hy), strict=True)
-        ):
-            if pull is None:
-                array.zero_()
-            else:
-                array.assign(pull[:, axis] * h)
-
-    def _segment(self, start: int, end: int) -> _Segment:
+        """Put the numbers of some steps, and the state they begin with, on the device."""
         base = self._base(start)
-        terms = tuple(self._terms.get(end, ()))
-        key = (base, end - start, *map(id, terms))
-        found = self._segments.get(key)
-        if found is None or found.plan != self._plan:
-            slots = slice(base, base + end - start)
-            found = _Segment(
-                self.stages,
-                self._adjoint,
-                self.states[base : base + end - start + 1],
-                self._impulses[slots],
-                self._pull[base : base + end - start + 1],
-                self._efforts[slots],
-                terms,
-                self._plan,
-                self._pool,
-            )
-            self._segments[key] = found
-        return found
+        self._numbers.put(base, self._all_numbers[start:end])
+        self._boxes.put(base, self._all_boxes[start:end])
+        self._copy(self._kept(self._before), [table.row(base) for table in self._states])
+
+    @exclusive
+    def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:
+        for a, b in zip(source, to, strict=True):
+            if a.size:
+                wp.copy(b, a)
 
 
-class _Segment:
-    """Steps on a tape, with the objectives that look at their end; captured when first used."""
-
-    def __init__(self, stages, adjoint, states, impulses, pulls, efforts, terms, plan, pool):
-        self.stages, self.adjoint, self.states, self.plan = stages, adjoint, states, plan
-        self.impulses, self.pulls, self.efforts, self.terms = impulses, pulls, efforts, terms
-        self._tapes: dict[int, wp.Tape] = {}
-        self._pool, self._forward, self._backward = pool, None, None
-
-    def advance(self) -> None:
-        """Take the steps."""
-        if self._forward is None:
-            self._forward = Replay(self.stages.device, self._record, self._pool)
-        self._forward.launch()
-
-    def reverse(self, watch: Callable[[int, State], None] | None = None) -> None:
-        """Go back through them."""
-        if watch:
-            self._play_back(watch)
-            return
-        if self._backward is None:
-            self._backward = Replay(self.stages.device, self._play_back, self._pool)
-        self._backward.launch()
-
-    def _record(self) -> None:
-        """Take the steps and put them on a tape; launches only."""
-        tape = wp.Tape()
-        for state in self.states:
-            for a in state.arrays:
-                a.mark_init()
-        for n, impulses in enumerate(self.impulses):
-            before, after = self.states[n : n + 2]
-            self.stages.advance(before, after, impulses)
-            if wp.config.verify_autograd_array_access:
-                _mark(before, after)
-            if self.efforts[n].size:
-                self._measure_effort(before, impulses, self.efforts[n])
-            back = partial(self.adjoint.reverse, before, impulses, after.gradient, before.gradient)
-            tape.record_func(back, before.arrays + after.arrays)
-            if after.p_x.size:
-                tape.record_func(partial(self._add_pull, n + 1), [after.p_x, after.p_y])
-        for term in self.terms:
-            term.record(tape, self.states[-1])
-        self._tapes[_strip()] = tape
-
-    def _play_back(self, watch: Callable[[int, State], None] | None = None) -> None:
-        """Play the tape back; launches only, unless it is watched."""
-        if watch is None:
-            self._tapes[_strip()].backward()
-            return
-        step = len(self.impulses)
-        for back in reversed(self._tapes[0].launches):
-            back()
-            if back.func == self.adjoint.reverse:
-                step -= 1
-                watch(step, self.states[step].gradient)
-
-    def _add_pull(self, slot: int) -> None:
-        state = self.states[slot]
-        for pull, p in zip(self.pulls[slot], (state.p_x, state.p_y), strict=True):
-            misfit.add_entries.launch(len(p), self.stages.device, [pull], [p.grad])
-
-    def _measure_effort(self, state: State, impulses: Impulses, rows: wp.array) -> None:
-        """Squares of what forces add to the velocity, summed along rows; launches only."""
-        stages = self.stages
-        pushed, layout = stages.push(state, impulses), stages.layout
-        for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
-            inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
-            misfit.row_squares.launch(layout.ny, stages.device, inputs, [rows])
+def record(tape: wp.Tape, back: Callable[[], None], read: State, written: State) -> None:
+    """Put a step on a tape; Warp learns what it read and wrote (`wp.config.verify_autograd_array_access`)."""
+    for a in written.arrays:
+        a.mark_write(operation="a step", filename=__file__, lineno=0)
+    for a in read.arrays:
+        a.mark_read()
+    tape.record_func(back, read.arrays + written.arrays)
 
 
 def _strip() -> int:
     """The strip whose launches are being captured."""
     strip = STRIP.get()
     return strip.index if strip else 0
-
-
-def _mark(read: State, written: State) -> None:
-    """Tell Warp what a step reads and writes, for `wp.config.verify_autograd_array_access`."""
-    for a in written.arrays:
-        a.mark_write(operation="a step", filename=__file__, lineno=0)
-    for a in read.arrays:
-        a.mark_read()
-
-
-@exclusive
-def _copy(source: State, to: State) -> None:
-    for a, b in zip(source.arrays, to.arrays, strict=True):
-        if a is not b:
-            wp.copy(b, a)
