@@ -50,15 +50,16 @@ class Blobs:
     moments: int
     """Entries of a row of moments, which gradients are made of."""
 
-    def bind(self, numbers: wp.array, boxes: wp.array, moments: wp.array) -> None:
-        """Read and write from now on in these arrays."""
+    def bind(self, numbers: wp.array, boxes: wp.array, moments: wp.array | None) -> None:
+        """Read and write from now on in these arrays; no moments where there are no gradients."""
         count = self.count
         self._center_x, self._center_y, self._radius, *self._strengths = (
             numbers[n * count : (n + 1) * count] for n in range(_NUMBERS)
         )
         self._boxes: Indices = boxes
-        size = self.moments // _FIELDS
-        self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS if size else 0)]
+        if moments is not None:
+            size = self.moments // _FIELDS
+            self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS)]
 
     def row(self, blobs: Sequence[Blob], live: Sequence[bool] = ()) -> tuple[np.ndarray, np.ndarray]:
         """The numbers and the boxes of what they do in a step.

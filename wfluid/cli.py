@@ -1,4 +1,4 @@
-"""The command line: wfluid animate, wfluid render, wfluid warmup, wfluid --version.
+"""The command line: wfluid animate, render, check-gradient, warmup; wfluid --version.
 
 Exit codes: 0 done, 1 the run failed, 2 bad input (one line on stderr), 130 interrupted.
 """
@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import os
 import re
+import subprocess
 import sys
 import warnings
 from collections.abc import Sequence
@@ -76,6 +78,7 @@ class Keys(argparse.Action):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; returns the exit code."""
     options = _parser().parse_args(arguments)
+    options.arguments = sys.argv[1:] if arguments is None else list(arguments)
     warnings.simplefilter("ignore")
     warnings.filterwarnings("always", module="wfluid")
     warnings.showwarning = _show_warning
@@ -156,6 +159,21 @@ def _parser() -> Parser:
     )
     _running(render)
     _common(render)
+    check = verbs.add_parser(
+        "check-gradient",
+        help="test the gradients of a scene",
+        description="Test by Taylor's rates, in double precision, the gradients with respect to every number "
+        "of a scene: 2 is exact, 1 is wrong.",
+        epilog="example: wfluid check-gradient shot.toml --cells 32",
+    )
+    check.set_defaults(run=run_check_gradient)
+    check.add_argument("scene", metavar="SCENE.toml", help="the scene")
+    check.add_argument(
+        "--set", **_repeated("KEY=VALUE", "change a value, such as time.duration=1 or force.nose.radius=40")
+    )
+    check.add_argument("--cells", type=int, default=48, help="cells along the longer side (48)")
+    check.add_argument("--seed", type=int, default=0, help="of the random directions (0)")
+    _common(check)
     warmup = verbs.add_parser(
         "warmup",
         help="compile the kernels now",
@@ -223,9 +241,10 @@ def _common(parser: argparse.ArgumentParser) -> None:
 def run_warmup(options: argparse.Namespace) -> int:
     """Compile the kernels."""
     from wfluid.device import load_kernels, open_device
+    from wfluid.kernels.cells import ADJOINT
 
     device = open_device(options.device)
-    seconds = load_kernels(device)
+    seconds = load_kernels(device) + load_kernels(device, ADJOINT)
     if not options.quiet:
         print(f"kernels for {device.name}: {seconds:.1f} s", file=sys.stderr)
     return 0
@@ -244,6 +263,19 @@ def run_render(options: argparse.Namespace) -> int:
 
     scene = read_scene(options.scene).with_values(options.set)
     return _run(scene.writing(options.output, options.report), options)
+
+
+def run_check_gradient(options: argparse.Namespace) -> int:
+    """Test the gradients of a scene; in a process of its own where this one is not in double precision."""
+    double = {"WFLUID_PRECISION": "float64"}
+    if os.environ.get("WFLUID_PRECISION") != double["WFLUID_PRECISION"]:
+        command = [sys.executable, "-m", "wfluid", *options.arguments]
+        return subprocess.call(command, env={**os.environ, **double})
+    from wfluid.check_gradient import check_gradient
+    from wfluid.scene import read_scene
+
+    scene = read_scene(options.scene).with_values(options.set)
+    return check_gradient(scene, options.cells, options.device, options.seed)
 
 
 def _run(scene, options: argparse.Namespace) -> int:

@@ -76,15 +76,16 @@ class Impulses:
             for size in (begin + sum(b.numbers for b in blobs), begin + sum(b.moments for b in blobs))
         )
         self.boxes = wp.zeros(sum(b.boxes for b in blobs), dtype=wp.int32, device=self.device)
-        step = _entries(self.numbers[:_STEP])
+        step = _entries(self.numbers, slice(0, _STEP))
         self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = step
         self._lone = slice(_STEP, _STEP + impulses)
-        self._impulses, self._impulses_bar = (_entries(a[self._lone]) for a in (self.numbers, self.bars))
+        self._impulses, self._impulses_bar = (_entries(a, self._lone) for a in (self.numbers, self.bars))
         at = self._lone.stop
         self._painted: list[slice] = []
         for pouring in self._pourings:
             self._painted.append(slice(at, at + pouring.painted))
-            pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
+            if pouring.painted:
+                pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
             at += pouring.painted
         number, moment, box = at, at, 0
         self._parts: dict[int, tuple[slice, slice]] = {}
@@ -92,7 +93,8 @@ class Impulses:
             numbers, moments = slice(number, number + part.numbers), slice(moment, moment + part.moments)
             boxes = slice(box, box + part.boxes)
             number, moment, box = numbers.stop, moments.stop, boxes.stop
-            part.bind(self.numbers[numbers], self.boxes[boxes], self.bars[moments])
+            taken = self.bars[moments] if part.moments else None
+            part.bind(self.numbers[numbers], self.boxes[boxes], taken)
             self._parts[id(part)] = numbers, moments
 
     @staticmethod
@@ -289,9 +291,9 @@ def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
     return list(found[0].values()), list(found[1].values())
 
 
-def _entries(array: wp.array) -> list[wp.array]:
-    """Each number of an array, as an array."""
-    return [array[n : n + 1] for n in range(len(array))]
+def _entries(array: wp.array, part: slice) -> list[wp.array]:
+    """Each number of a part of an array, as an array."""
+    return [array[n : n + 1] for n in range(part.start, part.stop)]
 
 
 def _index_of(name: str, densities: Sequence[str]) -> int:

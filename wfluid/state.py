@@ -95,7 +95,8 @@ class State:
     def view(self) -> State:
         """The same memory in arrays of its own, which may have other gradients."""
         u, v, d_x, d_y, q, p_x, p_y = (
-            a[:] for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
+            a[:] if a.size else wp.empty_like(a)
+            for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
         )
         return State(self.grid, u, v, d_x, d_y, q, tuple(rho[:] for rho in self.rho), p_x, p_y)
 

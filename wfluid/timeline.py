@@ -56,6 +56,16 @@ class Timeline:
         return self.substeps or math.ceil(STEPS_PER_SECOND / self.fps)
 
     @property
+    def steps(self) -> int:
+        """Steps to the last frame."""
+        return (self.frames - 1) * self.steps_per_frame
+
+    @property
+    def end(self) -> float:
+        """When the last frame is shown [s]."""
+        return self.time_of(self.steps)
+
+    @property
     def dt(self) -> float:
         """Length of a step [s]."""
         return self.time_of(1)

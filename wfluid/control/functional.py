@@ -207,8 +207,7 @@ class Functional:
             ValueError: outside the run, or between two steps.
         """
         timeline = self.timeline
-        steps = (timeline.frames - 1) * timeline.steps_per_frame
-        end = timeline.time_of(steps)
+        end = timeline.end
         if not 0 < t <= end * (1 + 1e-9):
             raise ValueError(f"an objective at {t:g} s: expected a time after 0 and up to {end:g} s")
         step = round(t / timeline.dt)

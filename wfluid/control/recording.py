@@ -80,7 +80,7 @@ class Recording:
                 "a viscosity that depends on the time has no gradients: give a number or a painting"
             )
         self.stages, self.timeline, self.device = stages, timeline, stages.device
-        self.steps = (timeline.frames - 1) * timeline.steps_per_frame
+        self.steps = timeline.steps
         self._terms, self._points = terms, points
         self._term_replays: dict[Callable, Replay] = {}
         grid, device = stages.grid, stages.device

@@ -58,7 +58,7 @@ class Table:
 
     def row(self, n: int) -> wp.array:
         """Row n itself."""
-        return self.array[n * self.size : (n + 1) * self.size]
+        return self.array if not self.size else self.array[n * self.size : (n + 1) * self.size]
 
     def put(self, first: int, values: np.ndarray) -> None:
         """Write rows (count, size), from `first` on."""

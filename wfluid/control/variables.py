@@ -34,6 +34,10 @@ class Setup:
     """Velocity at the beginning [longer side/s], (2, ny, nx): u on the first nx x-faces, v on the first
     ny y-faces. On walls it is 0, whatever is here."""
 
+    def number(self, name: str) -> object:
+        """What is under a name, such as "forces[0].vector"."""
+        return _follow(self, _path(name))
+
 
 @dataclass(frozen=True)
 class Free:
@@ -143,7 +147,7 @@ class Variables:
         return any(one.name == name or one.name.startswith((f"{name}.", f"{name}[")) for one in self.slices)
 
     def _get(self, name: str, setup: Setup | None = None) -> np.ndarray:
-        value = _follow(setup or self.setup, _path(name))
+        value = (setup or self.setup).number(name)
         return np.array(value.on(self.grid) if isinstance(value, Painted) else value, dtype=np.float64)
 
     def pack(self, setup: Setup | None = None) -> np.ndarray:

@@ -1,0 +1,81 @@
+"""wfluid check-gradient: Taylor's test of the gradients of a scene, in double precision."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+
+from wfluid.animation import Animation
+from wfluid.control.functional import Functional
+from wfluid.control.objectives import MapMisfit, Objective
+from wfluid.control.taylor import LEAST_RATE, taylor_rates
+from wfluid.control.variables import POSITIVE, VELOCITY, VISCOSITY, Free, Setup, known_names
+from wfluid.forces import flat
+from wfluid.grid import Grid
+from wfluid.kernels.cells import Real
+from wfluid.scene import Scene
+from wfluid.staging import stage
+
+TIGHT = 1e-12
+"""Tolerance of the solves, so that the gradient with respect to viscosity is exact too."""
+
+EXIT_WRONG = 1
+
+
+def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
+    """Test every number of a scene that has a gradient; print a table; 1 if one is wrong, else 0.
+
+    The objective is the mean square of the displacement at the end.
+
+    Raises:
+        ValueError: a scene that has nothing to vary, or that cannot run.
+    """
+    animation = stage(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
+    functional = _functional(animation, cells, device)
+    grid, steps = functional.grid, functional.timeline.steps
+    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: mean square of the displacement")
+    print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
+    wrong = 0
+    for rate in taylor_rates(functional, seed=seed):
+        shown = "linear" if np.isinf(rate.rate) else f"{rate.rate:.3f}"
+        verdict = "" if rate.holds else f"  below {LEAST_RATE}"
+        numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>6s}"
+        print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
+        wrong += not rate.holds
+    return EXIT_WRONG if wrong else 0
+
+
+def _functional(animation: Animation, cells: int, device: str | None) -> Functional:
+    """A functional of everything in an animation that can vary."""
+    picture, timeline = animation.picture, animation.timeline
+    grid = Grid.for_picture(picture.width, picture.height, cells)
+    fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
+    setup = Setup(fluid, flat(animation.forces), np.zeros((2, grid.ny, grid.nx)))
+    names = [name for name in known_names(setup) if not _held(name, setup)]
+    free = [Free(name, _scale(name, setup)) for name in names]
+    return Functional(
+        grid, fluid, setup.forces, timeline, _objective(grid, timeline.end), free, device=device
+    )
+
+
+def _objective(grid: Grid, end: float) -> Objective:
+    still = np.zeros((2, grid.ny, grid.nx))
+    return 2 / (grid.width * grid.height) * MapMisfit(still, end)
+
+
+def _held(name: str, setup: Setup) -> bool:
+    """What is not tested: a viscosity of 0, or one that sweeps solve for, has no gradient to rely on."""
+    if name != VISCOSITY:
+        return False
+    none = isinstance(setup.fluid.viscosity, float) and setup.fluid.viscosity == 0
+    return none or setup.fluid.solver == "jacobi"
+
+
+def _scale(name: str, setup: Setup) -> float:
+    """About how large the numbers are, for steps in proportion."""
+    if name.rpartition(".")[2] in POSITIVE or name == VELOCITY:
+        return 1.0
+    values = np.abs(np.asarray(setup.number(name), dtype=np.float64))
+    return float(values.max()) or 1.0
