@@ -243,10 +243,10 @@ class Impulses:
             krylov.row_products.launch(ny, self.device, inputs, [self._rows])
         krylov.mean_of.launch(1, self.device, [self._rows, len(x) * ny, 1], [out])
 
-    def prescribe_adjoint(self, b_bar: wp.array) -> None:
-        """The transpose of `prescribe`: launches only."""
+    def prescribe_adjoint(self, minus_b_bar: wp.array) -> None:
+        """The transpose of `prescribe`, from minus the gradient: launches only."""
         for growths in self._growths:
-            growths.adjoint(b_bar)
+            growths.adjoint(minus_b_bar)
 
     def pour_adjoint(self, density: int, rho_bar: wp.array) -> None:
         """The transpose of `pour` with respect to the sources: launches only."""

@@ -98,15 +98,15 @@ class Growths(_Gaussians):
         krylov.mean_of.launch(1, self.device, [self._rows, ny, nx * ny], [self.mean])
         sources.add_balanced.launch(self.layout, self.device, [s, self.mean], [b])
 
-    def adjoint(self, b_bar: wp.array) -> None:
-        """The transpose of `add`, down to the moments of the Gaussians: launches only."""
-        s_bar = self._swell
-        alone(s_bar.zero_)
-        self._add_balanced(b_bar, s_bar)
+    def adjoint(self, minus_b_bar: wp.array) -> None:
+        """The transpose of `add`, down to the moments of the Gaussians, all with minus: launches only."""
+        minus_s_bar = self._swell
+        alone(minus_s_bar.zero_)
+        self._add_balanced(minus_b_bar, minus_s_bar)
         if self._weights is not None:
-            sources.weigh.launch(self.layout, self.device, [self._weights], [s_bar])
-        self.blobs.measure_centres(s_bar)
+            sources.weigh.launch(self.layout, self.device, [self._weights], [minus_s_bar])
+        self.blobs.measure_centres(minus_s_bar)
 
     def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
         """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
-        return self.blobs.swell_gradient(numbers, moments)
+        return -self.blobs.swell_gradient(numbers, moments)
