@@ -149,7 +149,7 @@ class Animation:
         """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
         width, height = self.width or self.picture.width, self.height or self.picture.height
         return LookUp(
-            picture.resized(min(width, picture.width), min(height, picture.height)),
+            picture.shrunk(width, height),
             self.grid,
             self.fluid.walls,
             self.solver.device,

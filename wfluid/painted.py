@@ -67,6 +67,13 @@ class Painted:
         """The means over the grid's cells, (ny, nx)."""
         return _on_grid(self, grid)
 
+    def resampled(self, width: int, height: int) -> np.ndarray:
+        """The means over pixels of another size, (height, width)."""
+        if self.values.shape == (height, width):
+            return self.values.astype(np.float64)
+        values = resample(self.values.astype(np.float32), width, height)
+        return np.clip(values.astype(np.float64), self.values.min(), self.values.max())
+
 
 @dataclass(frozen=True, eq=False)
 class Keyed:
@@ -183,10 +190,7 @@ def check_painted(viscosity: np.ndarray | float) -> None:
 
 @lru_cache(maxsize=16)
 def _on_grid(painted: Painted, grid: Grid) -> np.ndarray:
-    if painted.values.shape == (grid.ny, grid.nx):
-        return painted.values.astype(np.float64)
-    values = resample(painted.values.astype(np.float32), grid.nx, grid.ny)
-    return np.clip(values.astype(np.float64), painted.values.min(), painted.values.max())
+    return painted.resampled(grid.nx, grid.ny)
 
 
 def _finite_from_zero(name: str, values: np.ndarray) -> None:

@@ -151,6 +151,10 @@ class Picture:
             return self
         return self.with_pixels(resample(self.pixels, width, height, filter=""))
 
+    def shrunk(self, width: int, height: int) -> Picture:
+        """The picture for frames of a size: shrunk where it is larger, so that they do not alias."""
+        return self.resized(min(width, self.width), min(height, self.height))
+
     def with_pixels(self, pixels: np.ndarray) -> Picture:
         """The same kind of picture with other pixels."""
         return replace(self, pixels=pixels)

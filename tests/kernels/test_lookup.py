@@ -100,7 +100,7 @@ def test_edges_continue_the_picture(device, filter, edge, mode):
     for pixels, cells, f in ((right, grid.nx / WIDTH, state.d_x), (down, grid.ny / HEIGHT, state.d_y)):
         f.fill_(pixels * cells)
     look_up = LookUp(image, grid, walls, device, filter=filter)
-    look_up._edges[:] = LookUp(image, grid, Walls(), device, filter=filter, edge=edge)._edges
+    look_up.edges[:] = LookUp(image, grid, Walls(), device, filter=filter, edge=edge).edges
     look_up._replay = Replay(device, look_up._look_up, None)
     got = look_up.render(state.d_x, state.d_y).pixels
     padded = np.pad(image.pixels, ((100, 100), (100, 100), (0, 0)), mode=mode)
