@@ -49,6 +49,12 @@ def test_the_variable_viscosity_check_holds(device):
         example.check([made[0], made[1], made[1]])
 
 
+def test_the_sensitivity_check_holds(device):
+    """Stiffening where the gradient says takes from the nose's way what it foretold, within 3 %."""
+    figures = load("sensitivity").check(cells=48, device=device.alias)
+    assert figures["lost_here"] > 0.2
+
+
 def test_every_scene_shows_its_control(device):
     """Each moves and does not fold; areas change by what the growth says and by nothing else."""
     example = load("scene_sheet")

@@ -22,6 +22,7 @@ _HOME = {
     "DensityMisfit": "control.objectives",
     "Effort": "control.objectives",
     "MapMisfit": "control.objectives",
+    "PictureMisfit": "control.picture_misfit",
     "ParticleFunction": "control.objectives",
     "ParticleMisfit": "control.objectives",
     "WarpObjective": "control.objectives",
