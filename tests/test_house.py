@@ -10,8 +10,9 @@ import wfluid
 
 ROOT = Path(__file__).parents[1]
 ORDER = [
-    "cells", "walls", "state", "multigrid", "linear", "impulses", "stages", "adjoint", "control/variables",
-    "control/objectives", "control/recording", "control/functional", "solver", "animation", "output", "report", "cli",
+    "cells", "walls", "state", "multigrid", "linear", "impulses", "stages", "adjoint",
+    "control/variables", "control/objectives", "control/recording", "control/functional",
+    "solver", "animation", "output", "report", "cli",
 ]  # fmt: skip
 
 
