@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -95,14 +96,38 @@ class Medium:
         now = (t if self.changes else 0.0, dt)
         if now == self._now:
             return False
-        mu = value_on(self.fluid.viscosity, self.grid, t)
-        check_painted(mu)
-        self.mu = np.broadcast_to(mu, self.mu.shape)
+        self.mu = self.at(t)
         from_numpy(self.mu, self._painted.mu, self._painted.layout)
-        self._painted.fill()
+        self.fill_painted()
         self._dt.assign([dt])
         self._now = now
         return True
+
+    def at(self, t: float) -> np.ndarray:
+        """The viscosity where it is painted at time t [s], (ny, nx).
+
+        Raises:
+            ValueError: it is negative, not finite or above the limit.
+        """
+        mu = value_on(self.fluid.viscosity, self.grid, t)
+        check_painted(mu)
+        return np.broadcast_to(mu, self.mu.shape)
+
+    def expect(self, times: Sequence[float], dt: float) -> None:
+        """Let the bounds of `stiffness` hold for the viscosity at all these times, and steps of dt.
+
+        Raises:
+            ValueError: as `at`.
+        """
+        self.forget()
+        self._dt.assign([dt])
+        self.mu = self.at(times[0])
+        for t in times[1:]:
+            self.mu = np.maximum(self.mu, self.at(t))
+
+    def fill_painted(self) -> None:
+        """Fill the ghosts of the viscosity where it is painted: launches only."""
+        self._painted.fill()
 
     def forget(self) -> None:
         """Have the next `follow` begin anew."""
@@ -142,7 +167,8 @@ class Medium:
             coarse.fill_beta()
 
     def stiffness(self, dt: float) -> Stiffness:
-        """The bounds for a step dt. Paint that moves may come to lie beside any other."""
+        """The bounds for a step dt. Paint that moves, or is still to come, may lie beside any other."""
+        moves = self.fluid.viscosity_moves
         hx, hy = self.grid.hx, self.grid.hy
         per_mu = 4 * dt * (max(2 / hx**2 + 1 / hy**2, 1 / hx**2 + 2 / hy**2) + 1 / (hx * hy))
         drag = 1 + dt * self.alpha
@@ -150,7 +176,7 @@ class Medium:
         return Stiffness(
             least=float(1 / (1 + per_mu * self.mu.max() / drag.min())),
             greatest=float(drag.max() + per_mu * self.mu.max()),
-            jump=float(rows.max() / rows.min()) if self.fluid.viscosity_moves else _steepest(rows),
+            jump=_steepest(rows) if self._now and not moves else float(rows.max() / drag.min()),
         )
 
     def drag_jump(self, dt: float) -> float:

@@ -14,7 +14,7 @@ O(dt^2) a step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import warp as wp
@@ -134,6 +134,14 @@ class Stages:
         if not medium or medium.changes or self.fluid.viscosity_moves or last_dt == 0 or swelled:
             return 0.0
         return min(1.0, dt / last_dt)
+
+    def expect(self, times: Sequence[float], dt: float) -> tuple:
+        """Make ready for steps of dt that end at these times, in a viscosity that depends on them.
+
+        Only how the solves go is known then: each step must take its viscosity, and `follow_medium`.
+        """
+        self.medium.expect(times, dt)
+        return self.diffusion.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
 
     def follow_medium(self, state: State | None = None) -> None:
         """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""

@@ -50,7 +50,7 @@ class Functional:
     Raises:
         ValueError: nothing free, or a name that cannot be; an objective's time outside the run or between two
             steps; a cap on memory too small; a velocity that does not fit the grid; a free viscosity, or
-            one that moves, whose diffusion is not solved well enough, or that depends on the time.
+            one that moves, whose diffusion is not solved well enough.
     """
 
     def __init__(

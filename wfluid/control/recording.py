@@ -60,7 +60,7 @@ class Recording:
     count too.
 
     Raises:
-        ValueError: a memory cap too small, with the least that works; a viscosity that depends on the time.
+        ValueError: a memory cap too small, with the least that works.
     """
 
     @exclusive
@@ -75,10 +75,6 @@ class Recording:
         of_viscosity: bool = False,
         effort: float = 0.0,
     ):
-        if stages.medium and stages.medium.changes:
-            raise ValueError(
-                "a viscosity that depends on the time has no gradients: give a number or a painting"
-            )
         self.stages, self.timeline, self.device = stages, timeline, stages.device
         self.steps = timeline.steps
         self._terms, self._points = terms, points
@@ -107,6 +103,8 @@ class Recording:
             Table(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
         )
         self._pulls = [Table(p, rows + 1) for p in self._before.particles]
+        changes = stages.medium and stages.medium.changes
+        self._viscosities = Table(stages.medium.painted_mu, rows) if changes else None
         self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
         self._square_rows = Table(self._squares, rows)
         self._counter, self._pool = Counter(device), stages.helpers()
@@ -127,7 +125,10 @@ class Recording:
         breaks = [step for step, terms in self._terms.items() if terms]
         if memory_mb is None:
             return even_segments(self.steps, breaks=breaks)
-        each = sum(a.capacity for a in self._kept(self._before)) / MEGABYTE
+        medium, row = self.stages.medium, sum(a.capacity for a in self._kept(self._before))
+        if medium and medium.changes:
+            row += self._before.u.capacity  # each step's own viscosity
+        each = row / MEGABYTE
         try:
             return even_segments(self.steps, int(memory_mb / each) - WORKING_STATES, breaks)
         except ValueError:
@@ -140,7 +141,8 @@ class Recording:
     @property
     def memory(self) -> int:
         """Bytes of all states and gradients."""
-        tables = sum(table.array.capacity for table in (*self._states, *self._stored))
+        viscosities = [self._viscosities] if self._viscosities else []
+        tables = sum(table.array.capacity for table in (*self._states, *self._stored, *viscosities))
         return tables + WORKING_STATES * sum(a.capacity for a in self._kept(self._before))
 
     def time_of(self, step: int) -> float:
@@ -163,7 +165,10 @@ class Recording:
             swelled = self._impulses.prescribed > 0
         self._all_numbers, self._all_boxes = (np.stack(column) for column in zip(*rows, strict=True))
         stages.take_fluid(setup.fluid)
-        plan = stages.plan(self.time_of(1), dt, self._prepare)
+        if self._viscosities:
+            plan = stages.expect([self.time_of(step + 1) for step in range(self.steps)], dt)
+        else:
+            plan = stages.plan(self.time_of(1), dt, self._prepare)
         if plan != self._plan:
             self._plan = plan
             self._forward = Replay(self.device, self._record, self._pool)
@@ -182,6 +187,7 @@ class Recording:
         def step() -> None:
             self._numbers.take(counter, impulses.numbers)
             self._boxes.take(counter, impulses.boxes)
+            self._take_viscosity()
             self.stages.advance(before, after, impulses)
             back = partial(self._adjoint.reverse, before, impulses, self._after_bar, self._bar)
             record(tape, back, before, after)
@@ -195,6 +201,16 @@ class Recording:
 
         repeat_while(counter.going, step)
         self._tapes[_strip()] = tape
+
+    def _take_viscosity(self) -> None:
+        """Take the step's own viscosity, where it depends on the time; launches only."""
+        if not self._viscosities:
+            return
+        medium = self.stages.medium
+        self._viscosities.take(self._counter, medium.painted_mu)
+        medium.fill_painted()
+        if not self.stages.fluid.viscosity_moves:  # else it is taken along in the step
+            self.stages.follow_medium()
 
     def _measure_effort(self) -> None:
         """Squares of what forces add to the velocity, summed along rows; launches only."""
@@ -213,6 +229,7 @@ class Recording:
         counter.count(-1)
         self._numbers.take(counter, impulses.numbers)
         self._boxes.take(counter, impulses.boxes)
+        self._take_viscosity()
         for table, f in zip(self._states, self._kept(before), strict=True):
             table.take(counter, f)
         for pulls, bar in zip(self._pulls, self._after_bar.particles, strict=True):
@@ -365,6 +382,9 @@ class Recording:
         base = self._base(start)
         self._numbers.put(base, self._all_numbers[start:end])
         self._boxes.put(base, self._all_boxes[start:end])
+        for step in range(start, end) if self._viscosities else ():
+            row = self._viscosities.row(base + step - start)
+            from_numpy(self.stages.medium.at(self.time_of(step + 1)), row, self.stages.layout)
         self._copy(self._kept(self._before), [table.row(base) for table in self._states])
 
     @exclusive
