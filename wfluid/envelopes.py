@@ -80,6 +80,8 @@ class Envelope(ABC):
         By Gauss's rule, as `integral`, and the jumps that move.
         """
         total = {name: np.zeros_like(slope) for name, slope in self.value_slopes((start + end) / 2).items()}
+        if not total:
+            return total
         for middle, half in self._pieces(start, end):
             for x, w in zip(_NODES, _WEIGHTS, strict=True):
                 for name, slope in self.value_slopes(middle + x * half).items():
@@ -93,8 +95,9 @@ class Envelope(ABC):
 
     def acts(self, start: float, end: float) -> bool:
         """Whether the integral over a step is other than 0, or would be for other numbers of the envelope."""
-        slopes = self.slopes(start, end).values()
-        return self.integral(start, end) != 0 or any(np.any(slope != 0) for slope in slopes)
+        if self.integral(start, end) != 0:
+            return True
+        return any(np.any(slope != 0) for slope in self.slopes(start, end).values())
 
     def __mul__(self, other: Envelope | float) -> Envelope:
         return product(self, other)
