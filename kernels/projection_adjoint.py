@@ -6,6 +6,20 @@ from wfluid.kernels.cells import Field, Uniform, adjoint_cells, inside
 
 
 @adjoint_cells
+def take(
+    i: int,
+    j: int,
+    k: int,
+    q_bar: Field,
+    # outputs
+    b: Field,
+):
+    """Take q_bar, the gradient of the pressure found, off b, in place."""
+    k = inside(k)
+    b[k] = b[k] - q_bar[k]
+
+
+@adjoint_cells
 def kept_difference(
     i: int,
     j: int,

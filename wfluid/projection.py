@@ -40,7 +40,6 @@ class Projection:
         self._q, self._minus_div = ((field(self.layout, device),) for _ in range(2))
         numbers = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
         self._inverse_h = [numbers[0:1], numbers[1:2]]
-        self._minus_one = wp.array([-1.0], dtype=Real, device=device)
         self._resisted = vector(self.layout, device, 2) if medium else ()
 
     def plan(self, dt: float) -> Solve:
@@ -96,8 +95,7 @@ class Projection:
         inputs = [*resisted, *self._inverse_h, pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
         if q_bar is not None:
-            inputs = [*self._minus_div, q_bar, self._minus_one]
-            relaxation.add_scaled.launch(self.layout, self.device, inputs, self._minus_div)
+            projection_adjoint.take.launch(self.layout, self.device, [q_bar], self._minus_div)
         self.system.solve(self.how, self._minus_div, self._q)
         inputs = [*out_bar, *self._q, *self._inverse_h, pitch]
         projection.subtract_gradient.launch(self.layout, self.device, inputs, velocity_bar)
