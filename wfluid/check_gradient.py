@@ -33,7 +33,7 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
         ValueError: a scene that has nothing to vary, or that cannot run.
     """
     animation = stage(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
-    functional = _functional(animation, cells, device)
+    functional = _functional(replace(animation, cells=cells))
     grid, steps = functional.grid, functional.timeline.steps
     print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: mean square of the displacement")
     print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
@@ -47,10 +47,9 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
     return EXIT_WRONG if wrong else 0
 
 
-def _functional(animation: Animation, cells: int, device: str | None) -> Functional:
+def _functional(animation: Animation) -> Functional:
     """A functional of everything in an animation that can vary."""
-    picture, timeline = animation.picture, animation.timeline
-    grid = Grid.for_picture(picture.width, picture.height, cells)
+    grid, timeline, device = animation.grid, animation.timeline, animation.device
     fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
     setup = Setup(fluid, flat(animation.forces), np.zeros((2, grid.ny, grid.nx)))
     names = [name for name in known_names(setup) if not _held(name, setup)]
