@@ -330,11 +330,13 @@ class _Program(Term):
     ):
         self._program, self._weight, self._particles = program, weight, particles
         self._value = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
+        self._nothing = wp.zeros(0, dtype=Real, device=device)
 
     def measure(self, state: State) -> None:
         """Run the program on a tape of its own."""
         self._value.zero_()
-        p_x, p_y = (p[self._particles] for p in state.particles)
+        own = self._particles
+        p_x, p_y = (p[own] if own.stop > own.start else self._nothing for p in state.particles)
         self._tape = wp.Tape()
         with self._tape:
             self._program(replace(state, p_x=p_x, p_y=p_y), self._value)
