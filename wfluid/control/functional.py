@@ -159,7 +159,7 @@ class Functional:
                 part, slope = term.at(t, places[step][own])
                 value += weight * part
                 pulls.setdefault(step, np.zeros_like(places[step]))[own] += weight * slope
-        if not np.isfinite(value):
+        if not (np.isfinite(value) and recording.finite):
             step = recording.first_step_not_finite()
             raise FloatingPointError(
                 "the objective is not finite"

@@ -266,6 +266,11 @@ class Recording:
         """What the last `forward` found of effort and of the terms."""
         return self._value
 
+    @property
+    def finite(self) -> bool:
+        """Whether the fluid was at the end of the last `forward`; what is not finite spreads, and stays."""
+        return all(np.all(np.isfinite(a.numpy())) for a in self._kept(self._before))
+
     def _places_at(self, row: int) -> np.ndarray:
         columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
         return np.stack(columns, axis=1) * (self.stages.grid.hx, self.stages.grid.hy)
