@@ -254,8 +254,8 @@ class Recording:
             for step in looked_at:
                 if action.start < step <= action.end:
                     places[step] = self._places_at(base + step - action.start)
-            squares = self._square_rows.rows(base, base + length)
-            self._value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
+            for squares in self._square_rows.rows(base, base + length):  # in an order that no cap changes
+                self._value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
             for term in self._terms.get(action.end, ()):
                 self._replay(term, term.measure).launch()
                 self._value += term.value()
