@@ -17,7 +17,7 @@ from wfluid.kernels.cells import ADJOINT, HALO, Layout, Real
 
 import wfluid.control.functional  # noqa: F401 - all of the adjoint's kernels, before any is loaded
 from wfluid import Buoyancy, Density, Fluid, GaussianForce, Grid, Growth, Painted, Source, VortexForce, Wind
-from wfluid.blobs import Blobs
+from wfluid.blobs import Blobs, blob_of
 from wfluid.density import PaintedSource
 from wfluid.device import load_kernels
 from wfluid.diffusion import ScalarDiffusion
@@ -438,6 +438,12 @@ def acting(forces, device, walls, densities=()):
     return impulses, [Ghosts(LAYOUT, own, device) for own in rules]
 
 
+def one_step(gradients, impulses):
+    """What gradients make of the one step that is on the device, by force."""
+    numbers, bars = impulses.numbers.numpy()[None], impulses.bars.numpy()[None]
+    return {n: rows[0] for n, rows in gradients(numbers, bars).items()}
+
+
 @pytest.mark.parametrize("walls", WALLS)
 def test_the_lift_of_a_density_is_transposed(device, walls):
     """With respect to the density, and to the impulse: of two densities each by its own buoyancy."""
@@ -457,7 +463,7 @@ def test_the_lift_of_a_density_is_transposed(device, walls):
     for bar in rho_bar:
         at_centres.fold(bar)
     assert_transposed(y, out, rho_bar, rho)
-    bars = impulses.gradients()
+    bars = one_step(impulses.gradients, impulses)
     right = sum(np.dot(bars[n], force.vector) * DT for n, force in enumerate(forces))
     left, size = inner(y, out, LAYOUT)
     assert abs(left - right) <= TOLERANCE * size
@@ -478,14 +484,14 @@ def test_pushes_twirls_and_winds_are_transposed_with_respect_to_their_strengths(
     state, y, out = State.at_rest(GRID, device), noise(LAYOUT, device, 2, 1), vector(LAYOUT, device, 2)
     impulses.push(state, out)
     impulses.push_adjoint(y, state, ())
-    bars = impulses.gradients()
+    bars = one_step(impulses.gradients, impulses)
     right = 0.0
     for n, force in enumerate(forces):
         if isinstance(force, Wind):
             right += np.dot(bars[n], force.integrals(0.0, DT))
         else:
-            done = force.over(0.0, DT)
-            right += np.dot(bars[n].push, done.push) + bars[n].turn * done.turn
+            bar, done = blob_of(bars[n]), force.over(0.0, DT)
+            right += np.dot(bar.push, done.push) + bar.turn * done.turn
     left, size = inner(y, out, LAYOUT)
     assert abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
 
@@ -502,9 +508,9 @@ def test_growths_are_transposed_with_respect_to_their_rates(device, walls):
     impulses, _ = acting(forces, device, walls)
     (y,), (b,) = noise(LAYOUT, device, 1, 1), vector(LAYOUT, device, 1)
     impulses.prescribe(b)
-    impulses.prescribe_adjoint(y)
-    bars = impulses.gradients()
-    right = sum(bars[n].swell * force.over(0.0, DT).swell for n, force in enumerate(forces))
+    impulses.prescribe_adjoint(wp.array(-y.numpy(), dtype=Real, device=device))
+    bars = one_step(impulses.gradients, impulses)
+    right = sum(blob_of(bars[n]).swell * force.over(0.0, DT).swell for n, force in enumerate(forces))
     left, size = inner([y], [b], LAYOUT)
     assert abs(to_numpy(b, LAYOUT).sum()) < 1e-11 and size > 1
     assert abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
@@ -522,8 +528,9 @@ def test_sources_are_transposed_with_respect_to_what_they_pour(device, walls):
     (y,), (rho,) = noise(LAYOUT, device, 1, 1), vector(LAYOUT, device, 1)
     impulses.pour(1, rho)
     impulses.pour_adjoint(1, y)
-    none, bars = impulses.source_gradients()
-    right = bars[0].amount * 2.0 * DT - bars[2].amount * 3.0 * DT + bars[1][0] * DT
+    (none, bars) = impulses.source_gradients(impulses.numbers.numpy()[None], impulses.bars.numpy()[None])
+    round_ones = [blob_of(bars[n][0]).amount for n in (0, 2)]
+    right = DT * (2.0 * round_ones[0] - 3.0 * round_ones[1] + bars[1][0, 0])
     left, size = inner([y], [rho], LAYOUT)
     assert none == {} and abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
 
@@ -560,11 +567,15 @@ def number(bar, name):
 def test_moments_hold_the_gradient_with_respect_to_every_number(device, kind, walls):
     """Of <y, what two Gaussians add>, one in a corner, against differences of fourth order."""
     blobs = Blobs(2, GRID, Walls.parse(walls), device, gradients=True)
+    numbers, moments = (wp.zeros(n, dtype=Real, device=device) for n in (blobs.numbers, blobs.moments))
+    boxes = wp.zeros(blobs.boxes, dtype=wp.int32, device=device)
+    blobs.bind(numbers, boxes, moments)
     count = 2 if kind == "push" else 1
     y = noise(LAYOUT, device, count, 1)
 
     def value(all_of_them):
-        blobs.set(all_of_them)
+        for values, array in zip(blobs.row(all_of_them), (numbers, boxes), strict=True):
+            array.assign(values)
         out = vector(LAYOUT, device, count)
         blobs.push(out) if kind == "push" else getattr(blobs, kind)(*out)
         return inner(y, out, LAYOUT)[0]
@@ -572,8 +583,9 @@ def test_moments_hold_the_gradient_with_respect_to_every_number(device, kind, wa
     names = {"push": ["push_x", "push_y", "turn"], "swell": ["swell"], "pour": ["amount"]}[kind]
     value(BLOBS)
     blobs.measure_push(y) if kind == "push" else blobs.measure_centres(*y)
-    bars = getattr(blobs, f"{kind}_gradient")()
-    for n, bar in enumerate(bars):
+    table = getattr(blobs, f"{kind}_gradient")(numbers.numpy()[None], moments.numpy()[None])
+    for n in range(len(BLOBS)):
+        bar = blob_of(table[:, 0, n])
         for name in ("x", "y", "radius", *names):
 
             def moved(by, n=n, name=name):

@@ -1,0 +1,413 @@
+"""Small runs that the tests of gradients share: fluids, forces, objectives and what of them may vary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+import warp as wp
+from oracles import from_streamfunction
+from viscous_media import centres, disc
+from warp_objectives import mean_square, product
+from wfluid.kernels.cells import HALO
+
+from wfluid import (
+    Arbitrary,
+    Buoyancy,
+    Constant,
+    Density,
+    Fade,
+    Fluid,
+    Freeze,
+    GaussianForce,
+    Grid,
+    Growth,
+    Oscillator,
+    Painted,
+    PaintedSource,
+    Path,
+    Source,
+    Stroke,
+    Timeline,
+    VortexForce,
+    Wind,
+)
+from wfluid.control.functional import Functional
+from wfluid.control.objectives import (
+    DensityMisfit,
+    Effort,
+    MapMisfit,
+    Objective,
+    ParticleFunction,
+    ParticleMisfit,
+    WarpObjective,
+)
+from wfluid.control.variables import Free
+
+GRID = Grid(23, 18, 1.0, 0.7)
+"""Another number of cells along y, of another height."""
+
+TIMELINE = Timeline(5 / 24, fps=24, substeps=2)
+"""Ten steps of 1/48 s."""
+
+END, MIDDLE = 10 / 48, 6 / 48
+"""When objectives look at the run [s]."""
+
+EXACT = {"diffusion_tolerance": 1e-13, "pressure_tolerance": 1e-13}
+"""Solves to a tolerance go on until rounding stops them."""
+
+
+def paint(low, high, seed):
+    """Smooth hills over the picture, (ny, nx), between two values."""
+    rng = np.random.default_rng(seed)
+    x, y = centres(GRID)
+    hills = sum(np.sin(a * x + b * y + c) for a, b, c in rng.uniform(2, 7, (4, 3)))
+    return low + (high - low) * (hills - hills.min()) / np.ptp(hills)
+
+
+def begin(strength=0.04):
+    """A velocity (2, ny, nx) [longer side/s] of a few eddies, without symmetry."""
+    u, v = from_streamfunction(
+        GRID,
+        lambda x, y: strength * (np.sin(5.1 * x + 0.4) * np.sin(6.3 * y + 0.3) + 0.7 * np.cos(4 * x - 7 * y)),
+    )
+    return np.stack([u[:, :-1], v[:-1]])
+
+
+WAVE = Oscillator(amplitude=1.3, period=0.3, phase=0.2)
+PUSH = GaussianForce((0.42, 0.33), (9.0, 5.0), 0.17, WAVE)
+MOVING = GaussianForce(
+    Path((0.0, 0.11, 0.3), [(0.2, 0.5), (0.52, 0.37), (0.7, 0.5)]),
+    (4.0, -7.0),
+    0.13,
+    Arbitrary(times=(0.0, 0.07, 0.2), values=(0.6, 1.4, 0.9)),
+)
+TWIRL = VortexForce((0.66, 0.28), 60.0, 0.14, 0.8 * Fade(rise=0.05, fall=0.08, end=0.2))
+GROWTH = Growth((0.35, 0.45), 5.0, 0.16, 1.2 * Oscillator(period=0.5, centred=False))
+SOFT_WIND = Wind((5.0, -3.0), WAVE, weight=Painted(paint(0, 1, 8)))
+STROKE = Stroke(Path((0.02, 0.08, 0.18), [(0.3, 0.2), (0.6, 0.3), (0.7, 0.5)]), 0.12, 0.7)
+
+POINTS = np.random.default_rng(1).uniform((0.15, 0.12), (0.85, 0.58), (7, 2))
+WANTED = POINTS + np.random.default_rng(2).normal(0, 0.05, (7, 2))
+PARTICLES = ParticleMisfit(POINTS, WANTED, END, weights=np.linspace(0.5, 2, 7))
+
+
+def wave(t, places):
+    """A function of places and the time, with its gradient."""
+    x, y = places.T
+    slope = np.stack([4 * np.cos(4 * x) * np.exp(y) + t, np.sin(4 * x) * np.exp(y)], axis=1)
+    return float(np.sum(np.sin(4 * x) * np.exp(y) + t * x)), slope
+
+
+FUNCTION = ParticleFunction(POINTS[:3] + 0.01, wave, (2 / 48, END))
+MAP = MapMisfit(np.stack([paint(-0.05, 0.05, 3), paint(-0.03, 0.06, 4)]), END, Painted(paint(0, 2, 5)))
+EARLY_MAP = MapMisfit(np.zeros((2, 18, 23)), MIDDLE)
+
+
+def far_apart(state, value):
+    """Of the particles, in Warp."""
+    wp.launch(mean_square, len(state.p_x), [state.p_x, state.p_y, value], device=value.device)
+
+
+def lively(state, value):
+    """Of the velocity, at every cell, in Warp."""
+    grid, layout = state.grid, state.layout
+    inputs = [state.u, state.v, grid.nx, layout.first, layout.pitch, 1 / (grid.nx * grid.ny), value]
+    wp.launch(product, grid.nx * grid.ny, inputs, device=value.device)
+
+
+def carried(state, value):
+    """Of a density and the displacement, at every cell, in Warp."""
+    grid, layout = state.grid, state.layout
+    inputs = [state.rho[0], state.d_y, grid.nx, layout.first, layout.pitch, 1 / (grid.nx * grid.ny), value]
+    wp.launch(product, grid.nx * grid.ny, inputs, device=value.device)
+
+
+INK = Density(
+    "ink",
+    diffusion=0.002,
+    initial=Painted(paint(0.5, 2, 6)),
+    sources=[
+        Source((0.3, 0.4), 6.0, 0.15, WAVE),
+        PaintedSource(Painted(paint(0.5, 3, 7)), Arbitrary(times=(0.0, 0.1, 0.3), values=(1.0, 0.4, 1.5))),
+    ],
+)
+SMOKE = Density(
+    "smoke",
+    diffusion=0.2,
+    initial=Painted(paint(1, 2, 9)),
+    sources=[Source(MOVING.center, -2.0, 0.2, 0.7 * WAVE)],
+)
+RISE = Buoyancy("ink", (2.0, -6.0), 1.1 * Constant(0.0, 0.15))
+FALL = Buoyancy("smoke", (1.0, 3.0), WAVE)
+INK_MISFIT = DensityMisfit("ink", paint(0, 2, 10), END, Painted(paint(0.5, 2, 11)))
+SMOKE_MISFIT = DensityMisfit("smoke", paint(0, 2, 12), MIDDLE)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A run, what is asked of it, and what may vary."""
+
+    forces: Sequence
+    objective: Objective
+    free: Sequence[str | Free]
+    fluid: dict = field(default_factory=dict)
+    velocity: np.ndarray | None = None
+    capped: bool = False
+    """Whether it has the least memory that it can do with."""
+
+    @property
+    def names(self):
+        """Of what may vary."""
+        return [one if isinstance(one, str) else one.name for one in self.free]
+
+    def functional(self, device, **changes):
+        """It as a functional."""
+        free = [Free(one) if isinstance(one, str) else one for one in self.free]
+        settings = {"velocity": self.velocity, "device": str(device)} | changes
+        run = (GRID, Fluid(**self.fluid), self.forces, settings.pop("timeline", TIMELINE))
+        if self.capped:
+            settings["memory_mb"] = least_memory(run, self.objective, free, settings)
+        return Functional(*run, self.objective, free, **settings)
+
+
+def least_memory(run, objective, free, settings):
+    """The memory [MB] that a refusal names as the least."""
+    with pytest.raises(ValueError, match="need at least") as refused:
+        Functional(*run, objective, free, **{**settings, "memory_mb": 1e-3})
+    return float(str(refused.value).rpartition(" ")[2])
+
+
+def cells_of_traces(functional):
+    """The cells that the bilinear look-ups of the last run fell into, step by step.
+
+    Found from velocities and displacements alone, apart from the code under test: of every cell that of its
+    foot (the paper's scheme) or of the middle of its trace, as seen from centres and from faces, and
+    whether a wall stopped it; with a viscosity that moves, where it came from. Only where every state is
+    kept.
+    """
+    recording = functional._recording
+    assert recording.schedule.keeps_all
+    fluid, layout, steps = functional._recording.stages.fluid, recording.stages.layout, TIMELINE.steps
+    lines = layout.size // layout.pitch
+    u, v, d_x, d_y = (
+        table.rows(0, steps)[:, : lines * layout.pitch].reshape(steps, lines, layout.pitch)
+        for table in recording._states[:4]
+    )
+    inner = slice(HALO, HALO + layout.ny), slice(HALO, HALO + layout.nx)
+    paper, found = fluid.scheme == "paper", []
+    for f, h, n, axis in ((u, GRID.hx, GRID.nx, 2), (v, GRID.hy, GRID.ny, 1)):
+        centre = (f + np.roll(f, -1, axis))[:, *inner] / 2
+        offset = -TIMELINE.dt / h * centre * (1 if paper else 0.5)
+        if not fluid.walls.periodic[2 - axis]:
+            middle = (np.arange(n) + 0.5).reshape((1, n) if axis == 2 else (n, 1))
+            stopped = np.clip(offset, -middle, n - middle)
+            found.append(stopped != offset)
+            offset = stopped
+        found.append(np.floor(offset))
+        if paper:
+            found += [np.floor((offset + np.roll(offset, 1, side)) / 2) for side in (1, 2)]
+        else:
+            found.append(np.floor(offset + 0.5))
+    if fluid.viscosity_moves:
+        found += [np.floor(d[:, *inner]) for d in (d_x, d_y)]
+    return np.stack(found).astype(int)
+
+
+def hard_edge():
+    """A disc that stays, at once."""
+    return Freeze(disc(GRID, 0.7, 0.5, 0.16).astype(float))
+
+
+SHAPES = ("forces[*].center", "forces[*].radius")
+VELOCITY = Free("velocity", scale=0.1)
+
+CASES = {
+    "constant viscosity, free-slip": Case(
+        [PUSH, MOVING, TWIRL, GROWTH],
+        PARTICLES + 2e-4 * Effort(),
+        [
+            *SHAPES,
+            "forces[*].vector",
+            "forces[1].center.places",
+            Free("forces[2].spin", scale=30.0),
+            Free("forces[3].rate", scale=3.0),
+            "forces[0].envelope.amplitude",
+            "forces[0].envelope.period",
+            "forces[0].envelope.phase",
+            "forces[1].envelope.values",
+            "forces[2].envelope.gain",
+            "forces[3].envelope.gain",
+            "forces[3].envelope.factors[0].period",
+            "fluid.viscosity",
+            VELOCITY,
+        ],
+        {"viscosity": 0.01, **EXACT},
+        begin(),
+    ),
+    "painted viscosity, no-slip": Case(
+        [PUSH, MOVING, SOFT_WIND],
+        0.3 * FUNCTION + 2.0 * MAP + EARLY_MAP,
+        [
+            "forces[*].vector",
+            *SHAPES,
+            "forces[1].center.places",
+            "forces[2].envelope.period",
+            "fluid.viscosity",
+            VELOCITY,
+        ],
+        {"viscosity": paint(0.002, 0.03, 13), "walls": "no-slip", **EXACT},
+        begin(),
+    ),
+    "viscosity that moves, periodic": Case(
+        [TWIRL, GROWTH, Wind((3.0, 2.0), WAVE), STROKE],
+        0.01 * WarpObjective(far_apart, END, POINTS) + WarpObjective(lively, MIDDLE) + MAP,
+        [
+            "forces[*].vector",
+            *SHAPES,
+            "forces[0].spin",
+            "forces[1].rate",
+            "forces[2].envelope.phase",
+            "forces[3].strength",
+            "fluid.viscosity",
+            VELOCITY,
+        ],
+        {"viscosity": paint(0.002, 0.05, 14), "viscosity_moves": True, "walls": "periodic", **EXACT},
+        begin(),
+    ),
+    "soft freeze, free-slip and no-slip": Case(
+        [PUSH, MOVING, GROWTH],
+        PARTICLES + 0.5 * MAP + 1e-4 * Effort(),
+        [
+            "forces[*].vector",
+            *SHAPES,
+            "forces[1].center.places",
+            "forces[2].rate",
+            "fluid.viscosity",
+            VELOCITY,
+        ],
+        {
+            "viscosity": paint(0.001, 0.02, 15),
+            "freeze": Freeze(paint(0, 0.4, 16), 1e3),
+            "walls": "free-slip,no-slip",
+            **EXACT,
+        },
+        begin(),
+    ),
+    "hard freeze, no-slip and periodic": Case(
+        [TWIRL, GROWTH, PUSH],
+        MAP + WarpObjective(lively, END) + 0.2 * FUNCTION,
+        ["forces[*].vector", *SHAPES, "forces[0].spin", "forces[1].rate", "fluid.viscosity", VELOCITY],
+        {"viscosity": 0.004, "freeze": hard_edge(), "walls": "no-slip,periodic", **EXACT},
+        begin(),
+    ),
+    "densities, periodic and free-slip": Case(
+        [RISE, FALL, PUSH],
+        INK_MISFIT + 0.5 * SMOKE_MISFIT + 0.1 * WarpObjective(carried, END),
+        [
+            "forces[*].vector",
+            "forces[0].envelope.gain",
+            "forces[1].envelope.period",
+            "forces[2].center",
+            "fluid.densities[*].sources[*].rate",
+            "fluid.densities[*].sources[*].center",
+            "fluid.densities[1].sources[0].center.places",
+            "fluid.densities[*].sources[*].radius",
+            "fluid.densities[0].sources[0].envelope.phase",
+            "fluid.densities[0].sources[1].envelope.values",
+            "fluid.densities[1].sources[0].envelope.gain",
+            "fluid.viscosity",
+            VELOCITY,
+        ],
+        {"viscosity": 0.005, "densities": [INK, SMOKE], "walls": "periodic,free-slip", **EXACT},
+        begin(),
+    ),
+    "Jacobi sweeps, no-slip": Case(
+        [PUSH, TWIRL, RISE, GROWTH],
+        PARTICLES + 0.2 * INK_MISFIT + MAP,
+        [
+            "forces[*].vector",
+            *SHAPES,
+            "forces[1].spin",
+            "forces[3].rate",
+            VELOCITY,
+            "fluid.densities[0].sources[0].rate",
+        ],
+        {
+            "viscosity": paint(0.002, 0.03, 17),
+            "densities": [INK],
+            "solver": "jacobi",
+            "sweeps": 12,
+            "walls": "no-slip",
+        },
+        begin(),
+    ),
+    "the paper's scheme, free-slip": Case(
+        [PUSH, MOVING, TWIRL],
+        PARTICLES + MAP + 1e-4 * Effort(),
+        [
+            "forces[*].vector",
+            *SHAPES,
+            "forces[1].center.places",
+            "forces[2].spin",
+            "forces[0].envelope.phase",
+            VELOCITY,
+        ],
+        {"viscosity": 0.01, "scheme": "paper", "sweeps": 20},
+        begin(),
+    ),
+    "the paper's scheme, periodic": Case(
+        [FALL, RISE, GROWTH, PUSH],
+        0.1 * INK_MISFIT + 0.1 * SMOKE_MISFIT + MAP,
+        ["forces[*].vector", "forces[*].radius", "fluid.densities[*].sources[*].rate", VELOCITY],
+        {
+            "viscosity": 0.01,
+            "scheme": "paper",
+            "sweeps": 15,
+            "densities": [INK, SMOKE],
+            "walls": "periodic",
+        },
+        begin(),
+    ),
+    "densities in the least memory, free-slip": Case(
+        [RISE, PUSH, MOVING],
+        INK_MISFIT + FUNCTION + 1e-4 * Effort(),
+        [
+            "forces[*].vector",
+            "forces[1].center",
+            "forces[2].center.places",
+            "fluid.viscosity",
+            "fluid.densities[0].sources[0].rate",
+            VELOCITY,
+        ],
+        {"viscosity": 0.005, "densities": [INK], **EXACT},
+        begin(),
+        capped=True,
+    ),
+    "painted viscosity in the least memory, no-slip and periodic": Case(
+        [PUSH, GROWTH, TWIRL],
+        PARTICLES + EARLY_MAP + MAP,
+        ["forces[*].vector", "forces[1].rate", "forces[2].spin", "fluid.viscosity", VELOCITY],
+        {"viscosity": paint(0.002, 0.03, 18), "walls": "no-slip,periodic", **EXACT},
+        begin(),
+        capped=True,
+    ),
+}
+
+
+def compared(device):
+    """Gradients of some cases by their names and slices, with solves that single precision can finish."""
+    found = {}
+    for name in (
+        "constant viscosity, free-slip",
+        "viscosity that moves, periodic",
+        "densities, periodic and free-slip",
+    ):
+        case = CASES[name]
+        fluid = case.fluid | {"diffusion_tolerance": 1e-5}
+        functional = replace(case, fluid=fluid).functional(device)
+        _, gradient = functional.value_and_gradient(functional.start)
+        found[name] = {one.name: gradient[one.entries].tolist() for one in functional.variables.slices}
+    return found
