@@ -203,10 +203,17 @@ def test_a_free_viscosity_of_zero_is_refused_for_its_logarithm_varies(make):
 @pytest.mark.parametrize(
     "viscosity", [lambda t: 0.01 + t, Keyed({0.0: 0.01, 0.1: 0.02})], ids=["function", "keys"]
 )
-def test_a_viscosity_that_depends_on_the_time_is_refused(make, viscosity):
+def test_a_viscosity_that_depends_on_the_time_cannot_vary(make, viscosity):
+    """It may be there."""
     fluid = {"viscosity": viscosity, **SURE}
-    refuses("a viscosity that depends on the time has no gradients", make, fluid=fluid)
     refuses("fluid.viscosity cannot vary here", make, free=["fluid.viscosity"], fluid=fluid)
+    functional = make(fluid=fluid)
+    assert np.isfinite(functional.value(functional.start))
+
+
+def test_a_viscosity_that_turns_negative_is_refused_at_once(make):
+    viscosity = {"viscosity": lambda t: 0.05 - t}
+    refuses("viscosity at 0.0625 s", make, fluid=viscosity)
 
 
 @pytest.mark.parametrize("point", [(-0.01, 0.3), (1.01, 0.3), (0.4, -0.01), (0.4, 0.71)], ids=str)
