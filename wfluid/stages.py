@@ -39,6 +39,9 @@ STRIPS = 2
 SHARED_CELLS = 300 * 300
 """Cells from which on sharing a step gains more than the threads lose where other work runs beside it."""
 
+SHARED_ALONE = 160 * 160
+"""The same where no other work does: in the evaluations of an optimisation."""
+
 COUPLED_WORK = 4
 """Times as much work that a coupled diffusion makes of a step."""
 
@@ -99,10 +102,14 @@ class Stages:
             self.medium.fluid = fluid
             self.medium.forget()
 
-    def helpers(self) -> Helpers | None:
-        """The threads that share the launches of a step beside the calling one, where that gains."""
+    def helpers(self, alone: bool = False) -> Helpers | None:
+        """The threads that share the launches of a step beside the calling one, where that gains.
+
+        It gains earlier where the process is `alone`, has no other work to do meanwhile.
+        """
         work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.medium else 1)
-        shared = not self.device.is_cuda and free_cores() >= STRIPS and work >= SHARED_CELLS
+        least = SHARED_ALONE if alone else SHARED_CELLS
+        shared = not self.device.is_cuda and free_cores() >= STRIPS and work >= least
         return helpers(STRIPS if shared else 1)
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:

@@ -301,7 +301,7 @@ def test_two_threads_compute_the_bits_of_one(device, monkeypatch, name):
     free += ["fluid.densities[0].sources[0].rate"] + ["fluid.viscosity"] * (name != "paper")
     found = []
     for least in (0, 10**9):
-        monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", least)
+        monkeypatch.setattr(wfluid.stages, "SHARED_ALONE", least)
         functional = Functional(
             LARGE, fluid, forces, FOUR_STEPS, objective, [Free(one) for one in free], device=str(device)
         )

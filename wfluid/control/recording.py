@@ -107,7 +107,7 @@ class Recording:
         self._viscosities = Table(stages.medium.painted_mu, rows) if changes else None
         self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
         self._square_rows = Table(self._squares, rows)
-        self._counter, self._pool = Counter(device), stages.helpers()
+        self._counter, self._pool = Counter(device), stages.helpers(alone=True)
         self._preparation: Replay | None = None
         self._tapes: dict[int, wp.Tape] = {}
         self._plan: tuple = ()
