@@ -90,6 +90,7 @@ MOVING = GaussianForce(
 )
 TWIRL = VortexForce((0.66, 0.28), 60.0, 0.14, 0.8 * Fade(rise=0.05, fall=0.08, end=0.2))
 GROWTH = Growth((0.35, 0.45), 5.0, 0.16, 1.2 * Oscillator(period=0.5, centred=False))
+BRIEF_GROWTH = replace(GROWTH, envelope=Constant(0.0, 0.07))
 SOFT_WIND = Wind((5.0, -3.0), WAVE, weight=Painted(paint(0, 1, 8)))
 STROKE = Stroke(Path((0.02, 0.08, 0.18), [(0.3, 0.2), (0.6, 0.3), (0.7, 0.5)]), 0.12, 0.7)
 
@@ -281,7 +282,7 @@ CASES = {
         begin(),
     ),
     "soft freeze, free-slip and no-slip": Case(
-        [PUSH, MOVING, GROWTH],
+        [PUSH, MOVING, BRIEF_GROWTH],
         PARTICLES + 0.5 * MAP + 1e-4 * Effort(),
         [
             "forces[*].vector",
@@ -300,7 +301,7 @@ CASES = {
         begin(),
     ),
     "hard freeze, no-slip and periodic": Case(
-        [TWIRL, GROWTH, PUSH],
+        [TWIRL, BRIEF_GROWTH, PUSH],
         MAP + WarpObjective(lively, END) + 0.2 * FUNCTION,
         ["forces[*].vector", *SHAPES, "forces[0].spin", "forces[1].rate", "fluid.viscosity", VELOCITY],
         {"viscosity": 0.004, "freeze": hard_edge(), "walls": "no-slip,periodic", **EXACT},
