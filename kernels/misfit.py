@@ -39,14 +39,3 @@ def row_squares(
         left = f[at + i] - target[at + i]
         total += left * left
     rows[first + t] = total
-
-
-@adjoint_lines
-def add_entries(
-    t: int,
-    f: Field,
-    # outputs
-    out: Field,
-):
-    """Add entry t of a table, in place."""
-    out[t] = out[t] + f[t]

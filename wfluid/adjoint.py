@@ -4,7 +4,8 @@ before it, to the forces and to the viscosity.
 A step's stages are gone through in opposite order, each transposed about what the step began with; feet
 and pushes, which cost little, are computed again, so that of each step only its state need be kept. A
 linear solve with a symmetric solver M is its own transpose, so none of its sweeps or iterates is
-recorded. x_bar stands for the gradient of an objective with respect to x.
+recorded; conjugate gradients are so only up to their tolerance. x_bar stands for the gradient of an
+objective with respect to x.
 """
 
 from __future__ import annotations
@@ -24,15 +25,15 @@ from wfluid.walls import Ghosts
 
 
 class StepAdjoint:
-    """The transposes of a step's `stages`, which must not be at work elsewhere. They only launch.
+    """The transposes of steps of dt [s] with `stages`, which must not be at work elsewhere. They only launch.
 
     With `of_viscosity` the gradient with respect to viscosity is found as well, which is right only as
     far as the diffusion is solved; with `effort` that of half the squares of what forces add.
     """
 
-    def __init__(self, stages: Stages, of_viscosity: bool = False, effort: float = 0.0):
+    def __init__(self, stages: Stages, dt: float, of_viscosity: bool = False, effort: float = 0.0):
         self.stages, self.device, self.layout = stages, stages.device, stages.layout
-        self.compile_seconds = load_kernels(stages.device, ADJOINT)
+        load_kernels(stages.device, ADJOINT)
         self._effort = effort
         grid, layout, device = stages.grid, stages.layout, stages.device
         self._moves = stages.fluid.viscosity_moves
@@ -53,7 +54,7 @@ class StepAdjoint:
         )
         self._effort_bar = vector(layout, device, 2) if effort else ()
         numbers = wp.array(
-            [1 / grid.hx, 1 / grid.hy, grid.hx**-2, grid.hy**-2, 0.0], dtype=Real, device=device
+            [1 / grid.hx, 1 / grid.hy, grid.hx**-2, grid.hy**-2, dt], dtype=Real, device=device
         )
         self._inverse_h, self._inverse_h2 = [numbers[0:1], numbers[1:2]], [numbers[2:3], numbers[3:4]]
         self._dt = numbers[4:5]
@@ -65,10 +66,6 @@ class StepAdjoint:
         """Bring what steps added to `mu_bar` for ghosts to the cells; after all of them."""
         if self._moves:
             Ghosts(self.layout, self.stages.fluid.walls.centre_rules(), self.device).fold(self.mu_bar)
-
-    def set_step(self, dt: float) -> None:
-        """Take the length of the steps [s]."""
-        self._dt.assign([dt])
 
     def reverse(self, state: State, impulses: Impulses, out_bar: State, bar: State) -> None:
         """`bar` = the gradient with respect to `state`, from `out_bar`, that after the step from it.
@@ -156,6 +153,7 @@ class StepAdjoint:
             for own, ghosts in zip(self._own_feet, stages.velocity_ghosts, strict=False):
                 for f in own:
                     ghosts.fill(f)
+        with together():
             for axis, moved in enumerate((out_bar.d_x, out_bar.d_y)):
                 inputs = [*(own[axis] for own in self._own_feet), moved, self.layout.pitch]
                 out = [self._foot_bar[axis]]

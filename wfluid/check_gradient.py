@@ -9,9 +9,10 @@ import numpy as np
 
 from wfluid.animation import Animation
 from wfluid.control.functional import Functional
-from wfluid.control.objectives import MapMisfit, Objective
+from wfluid.control.objectives import DensityMisfit, MapMisfit, Objective
 from wfluid.control.taylor import LEAST_RATE, taylor_rates
 from wfluid.control.variables import POSITIVE, VELOCITY, VISCOSITY, Free, Setup, known_names
+from wfluid.fluid import Fluid
 from wfluid.forces import flat
 from wfluid.grid import Grid
 from wfluid.kernels.cells import Real
@@ -21,13 +22,16 @@ from wfluid.staging import stage
 TIGHT = 1e-12
 """Tolerance of the solves, so that the gradient with respect to viscosity is exact too."""
 
+DENSITY_WEIGHT = 1e-3
+"""Of a density's square beside the displacement's, which is as small."""
+
 EXIT_WRONG = 1
 
 
 def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
     """Test every number of a scene that has a gradient; print a table; 1 if one is wrong, else 0.
 
-    The objective is the mean square of the displacement at the end.
+    The objective is the mean square of the displacement, and of densities, at the end.
 
     Raises:
         ValueError: a scene that has nothing to vary, or that cannot run.
@@ -35,11 +39,14 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
     animation = stage(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
     functional = _functional(replace(animation, cells=cells))
     grid, steps = functional.grid, functional.timeline.steps
-    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: mean square of the displacement")
+    seen = " and ".join(["the displacement", *animation.fluid.density_names])
+    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: mean square of {seen}")
     print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
     wrong = 0
     for rate in taylor_rates(functional, seed=seed):
-        shown = "linear" if np.isinf(rate.rate) else f"{rate.rate:.3f}"
+        shown = f"{rate.rate:.3f}"
+        if not np.isfinite(rate.rate):
+            shown = "linear" if np.isinf(rate.rate) else "unseen"
         verdict = "" if rate.holds else f"  below {LEAST_RATE}"
         numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>6s}"
         print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
@@ -54,14 +61,17 @@ def _functional(animation: Animation) -> Functional:
     setup = Setup(fluid, flat(animation.forces), np.zeros((2, grid.ny, grid.nx)))
     names = [name for name in known_names(setup) if not _held(name, setup)]
     free = [Free(name, _scale(name, setup)) for name in names]
-    return Functional(
-        grid, fluid, setup.forces, timeline, _objective(grid, timeline.end), free, device=device
-    )
+    objective = _objective(grid, fluid, timeline.end)
+    return Functional(grid, fluid, setup.forces, timeline, objective, free, device=device)
 
 
-def _objective(grid: Grid, end: float) -> Objective:
-    still = np.zeros((2, grid.ny, grid.nx))
-    return 2 / (grid.width * grid.height) * MapMisfit(still, end)
+def _objective(grid: Grid, fluid: Fluid, end: float) -> Objective:
+    """The mean square of the displacement at the end, and of every density."""
+    mean, none = 2 / (grid.width * grid.height), np.zeros((grid.ny, grid.nx))
+    total: Objective = mean * MapMisfit(np.stack([none, none]), end)
+    for name in fluid.density_names:
+        total += DENSITY_WEIGHT * mean * DensityMisfit(name, none, end)
+    return total
 
 
 def _held(name: str, setup: Setup) -> bool:

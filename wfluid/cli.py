@@ -274,6 +274,8 @@ def run_check_gradient(options: argparse.Namespace) -> int:
     from wfluid.check_gradient import check_gradient
     from wfluid.scene import read_scene
 
+    if options.seed < 0:
+        raise ValueError(f"--seed {options.seed}: expected a whole number from 0 on")
     scene = read_scene(options.scene).with_values(options.set)
     return check_gradient(scene, options.cells, options.device, options.seed)
 

@@ -157,7 +157,8 @@ class SeparateDiffusion:
 class CoupledDiffusion:
     """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
 
-    def __init__(self, fluid: Fluid, medium: Medium, device: wp.Device):
+    def __init__(self, fluid: Fluid, medium: Medium, device: wp.Device, jump_tolerance: float = 1.0):
+        self._jump_tolerance = jump_tolerance
         self.fluid, self.medium, self.device = fluid, medium, device
         self.layout = medium.levels[0].layout
         levels = [Stress(level, medium.size, fluid.walls, device) for level in medium.levels]
@@ -177,7 +178,7 @@ class CoupledDiffusion:
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.how = sweeps
         elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:
-            self.how = conjugate_gradients(tolerance)
+            self.how = conjugate_gradients(min(tolerance, self._jump_tolerance))
         else:
             self.how = self.system.plan_cycles(tolerance)
         self.system.prepare(self.how)

@@ -20,7 +20,15 @@ from wfluid.state import Vector, field, vector
 class Projection:
     """Takes the divergence out of a velocity."""
 
-    def __init__(self, grid: Grid, fluid: Fluid, medium: Medium | None, device: wp.Device):
+    def __init__(
+        self,
+        grid: Grid,
+        fluid: Fluid,
+        medium: Medium | None,
+        device: wp.Device,
+        jump_tolerance: float = 1.0,
+    ):
+        self._jump_tolerance = jump_tolerance
         self.fluid, self.medium, self.device, self.layout = fluid, medium, device, Layout(grid.nx, grid.ny)
         size, walls = (grid.width, grid.height), fluid.walls
         if medium:
@@ -46,7 +54,7 @@ class Projection:
         """Choose the solve for the medium's drag and steps of dt. `prepare` must follow."""
         if self.medium and self.fluid.solver != "jacobi":
             if self.medium.drag_jump(dt) > JUMP_LIMIT:
-                self.how = conjugate_gradients(self.fluid.pressure_tolerance)
+                self.how = conjugate_gradients(min(self.fluid.pressure_tolerance, self._jump_tolerance))
             else:
                 self.how = Solve("multigrid", self.fluid.pressure_cycles)
             self.system.prepare(self.how)

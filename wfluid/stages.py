@@ -47,9 +47,12 @@ COUPLED_WORK = 4
 
 
 class Stages:
-    """A step's stages and what they work with. They only launch, so that a graph may capture them."""
+    """A step's stages and what they work with. They only launch, so that a graph may capture them.
 
-    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+    Conjugate gradients go to the fluid's tolerances, or to `jump_tolerance` where that is lower.
+    """
+
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, jump_tolerance: float = 1.0):
         self.grid, self.fluid, self.device = grid, fluid, device
         self.layout = Layout(grid.nx, grid.ny)
         walls = fluid.walls
@@ -62,11 +65,12 @@ class Stages:
         self.where = where(grid, walls, self.layout)
         self.medium = None if fluid.separable else Medium(grid, fluid, device)
         self.diffusion = (
-            CoupledDiffusion(fluid, self.medium, device)
+            CoupledDiffusion(fluid, self.medium, device, jump_tolerance)
             if self.medium
             else SeparateDiffusion(grid, fluid, device)
         )
-        self.projection = Projection(grid, fluid, self.medium if fluid.freeze else None, device)
+        resisting = self.medium if fluid.freeze else None
+        self.projection = Projection(grid, fluid, resisting, device, jump_tolerance)
         self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
         self.foot = vector(self.layout, device, 2)
         self.pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))

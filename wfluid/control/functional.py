@@ -8,7 +8,9 @@
 
 The gradient is that of the very numbers the simulation computes, discretisation, walls and all, by the
 adjoint method (Bonilla & Velho, section III): whatever the number of free numbers, it costs about two
-more runs. It is right to rounding; with respect to viscosity, to the residual of the diffusion's solves.
+more runs. It is right to rounding where solves are cycles or sweeps, which are their own transposes. Where
+viscosity or drag jump they are conjugate gradients, which are so up to a tolerance (`JUMP_TOLERANCE`, for
+which a fluid's own is lowered here); and with respect to viscosity it is right up to the diffusion's.
 """
 
 from __future__ import annotations
@@ -36,9 +38,13 @@ from wfluid.diffusion import SURE_TOLERANCE
 from wfluid.fluid import Fluid
 from wfluid.forces import BlobForce, Force, Group, flat
 from wfluid.grid import Grid
+from wfluid.kernels.cells import Real
 from wfluid.stages import Stages
 from wfluid.state import State
 from wfluid.timeline import Timeline
+
+JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
+"""Most that conjugate gradients may leave undone of a solve."""
 
 
 class Functional:
@@ -68,7 +74,8 @@ class Functional:
     ):
         """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
 
-        `memory_mb` caps what the states of the run take; with less room most steps are computed twice.
+        `memory_mb` caps what the states of the run take, by far the most of its memory; with less room most
+        steps are computed twice.
         """
         shape = (2, grid.ny, grid.nx)
         velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
@@ -78,9 +85,12 @@ class Functional:
         self.grid, self.timeline, self.objective = grid, timeline, objective
         self.variables = Variables(setup, free, grid)
         self.start = self.variables.pack()
+        self.start.setflags(write=False)
         of_viscosity = self.variables.has(VISCOSITY)
         _check_solves(fluid, of_viscosity)
-        stages = Stages(grid, fluid, open_device(device))
+        if memory_mb is not None and not (np.isfinite(memory_mb) and memory_mb > 0):
+            raise ValueError(f"memory_mb {memory_mb}: expected a positive number of megabytes")
+        stages = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[Term]] = {}
         effort, begun = 0.0, 0
@@ -141,8 +151,11 @@ class Functional:
         found = self._recording.backward(pulls)
         gradient = self.variables.pull_back(self._gradients(found), np.asarray(m, dtype=np.float64))
         if not np.all(np.isfinite(gradient)):
+            self._recording.forward()  # a run with little memory has lost its end on the way back
             self._recording.backward(pulls, watch=self._refuse)
-            raise FloatingPointError("the gradient is not finite at the beginning")
+            slices = self.variables.slices
+            wrong = [one.name for one in slices if not np.all(np.isfinite(gradient[one.entries]))]
+            raise FloatingPointError(f"the gradient with respect to {', '.join(wrong)} is not finite")
         return value, gradient
 
     def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray]]:
@@ -194,7 +207,7 @@ class Functional:
                 continue
             for step, row in enumerate(found[n]):
                 start, end = self._recording.time_of(step), self._recording.time_of(step + 1)
-                if not force.envelope.acts(start, end):
+                if not np.any(row):
                     continue
                 bar = blob_of(row) if isinstance(force, BlobForce | Source) else row
                 for key, slope in force.pull_back(start, end, bar).items():

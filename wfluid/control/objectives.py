@@ -35,6 +35,18 @@ class Objective:
 
     __rmul__ = __mul__
 
+    def __neg__(self) -> Sum:
+        return -1.0 * self
+
+    def __sub__(self, other: Objective) -> Sum:
+        return self + -1.0 * other
+
+    def __truediv__(self, number: float) -> Sum:
+        return self * (1 / number)
+
+    def __radd__(self, zero: int) -> Objective:
+        return self if zero == 0 else NotImplemented  # for sum()
+
 
 @dataclass(frozen=True)
 class Sum(Objective):
@@ -48,6 +60,8 @@ class Sum(Objective):
     """Weight and objective of each."""
 
     def __post_init__(self) -> None:
+        parts = [(weight * own, term) for weight, whole in self.terms for own, term in terms_of(whole)]
+        object.__setattr__(self, "terms", tuple(parts))
         for weight, _ in self.terms:
             if not math.isfinite(weight):
                 raise ValueError(f"an objective's weight is {weight}: expected a finite number")
@@ -100,7 +114,10 @@ class ParticleMisfit(ParticleObjective):
             object.__setattr__(self, name, places_of(name, getattr(self, name)))
         if len(self.points) != len(self.destinations):
             raise ValueError(f"{len(self.points)} points and {len(self.destinations)} destinations")
-        weights = np.broadcast_to(np.asarray(self.weights, dtype=np.float64), len(self.points))
+        weights = np.asarray(self.weights, dtype=np.float64)
+        if weights.shape not in ((), (len(self.points),)):
+            raise ValueError(f"weights of shape {weights.shape} for {len(self.points)} particles")
+        weights = np.broadcast_to(weights, len(self.points)).copy()
         if not (np.all(np.isfinite(weights)) and np.all(weights >= 0)):
             raise ValueError("weights of particles: expected finite numbers from 0 on")
         object.__setattr__(self, "weights", weights)
@@ -305,6 +322,13 @@ class WarpObjective(StateObjective):
             wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
 
         WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
+
+    The program is called once, and what it launches captured and repeated: it must do nothing but launch.
+    Fields have ghosts, and rows padded to whole spans: the cell in column i of row j is entry
+    `first + j * pitch + i` of `state.layout`; what is read elsewhere has no gradient.
+
+    Raises:
+        ValueError: a program that launches nothing, when the objective is first asked for.
     """
 
     program: Callable[[State, wp.array], Any]
@@ -338,8 +362,14 @@ class _Program(Term):
         own = self._particles
         p_x, p_y = (p[own] if own.stop > own.start else self._nothing for p in state.particles)
         self._tape = wp.Tape()
+        own_state = replace(state, p_x=p_x, p_y=p_y)
         with self._tape:
-            self._program(replace(state, p_x=p_x, p_y=p_y), self._value)
+            self._program(own_state, self._value)
+        if not self._tape.launches:
+            raise ValueError("WarpObjective: the program launched no kernel that Warp can differentiate")
+        arrays = [a for n in self._tape.launches if not callable(n) for a in (*n[3], *n[4])]
+        kept = {a.ptr for a in (*own_state.arrays, self._value)}
+        self._between = [a for a in arrays if isinstance(a, wp.array) and a.grad and a.ptr not in kept]
 
     def value(self) -> float:
         """Times the weight."""
@@ -348,6 +378,8 @@ class _Program(Term):
     def adjoint(self, state: State, bar: State) -> None:
         """Play the tape back: the state's arrays know their gradients."""
         self._value.grad.fill_(self._weight)
+        for a in self._between:
+            a.grad.zero_()
         self._tape.backward()
 
 
@@ -357,7 +389,9 @@ def places_of(name: str, values: Any) -> np.ndarray:
     Raises:
         ValueError: they are not.
     """
-    values = np.asarray(values, dtype=np.float64).reshape(-1, 2) if np.size(values) else np.empty((0, 2))
+    values = np.array(values, dtype=np.float64) if np.size(values) else np.empty((0, 2))  # a copy
+    if values.ndim != 2 or values.shape[1] != 2:
+        raise ValueError(f"{name} of shape {values.shape}: expected (n, 2)")
     return _finite(name, values, values.shape)
 
 

@@ -81,10 +81,8 @@ class Recording:
         self._term_replays: dict[Callable, Replay] = {}
         grid, device = stages.grid, stages.device
         self._effort = effort * grid.hx * grid.hy / timeline.dt
-        self.compile_seconds = load_kernels(device)
-        self._adjoint = StepAdjoint(stages, of_viscosity, self._effort)
-        self._adjoint.set_step(timeline.dt)
-        self.compile_seconds += self._adjoint.compile_seconds
+        load_kernels(device)
+        self._adjoint = StepAdjoint(stages, timeline.dt, of_viscosity, self._effort)
         self._before, self._after, self._bar, self._after_bar = (
             State.at_rest(grid, device, len(stages.densities), len(points)) for _ in range(WORKING_STATES)
         )
@@ -170,9 +168,10 @@ class Recording:
         else:
             plan = stages.plan(self.time_of(1), dt, self._prepare)
         if plan != self._plan:
-            self._plan = plan
-            self._forward = Replay(self.device, self._record, self._pool)
-            self._backward = Replay(self.device, self._play_back, self._pool)
+            self._plan = ()  # should the captures be interrupted
+            forward = Replay(self.device, self._record, self._pool)
+            backward = Replay(self.device, self._play_back, self._pool)
+            self._forward, self._backward, self._plan = forward, backward, plan
 
     def _prepare(self) -> None:
         if self._preparation is None:
@@ -296,9 +295,7 @@ class Recording:
         `pulls` are gradients (n, 2) with respect to the particles' places [longer side] after some steps.
         With `watch`, which is told each step and the gradient before it, all is done singly, not replayed.
         """
-        self._adjoint.mu_bar.zero_()
-        for a in self._after_bar.arrays:
-            a.zero_()
+        self._clear()
         bars = np.zeros((self.steps, self._bars.size))
         for action in self.schedule.backward():
             if isinstance(action, Reverse):
@@ -316,6 +313,13 @@ class Recording:
             self._impulses.gradients(numbers, bars),
             self._impulses.source_gradients(numbers, bars),
         )
+
+    @exclusive
+    def _clear(self) -> None:
+        """Begin with no gradients."""
+        self._adjoint.mu_bar.zero_()
+        for a in self._after_bar.arrays:
+            a.zero_()
 
     def _reverse(
         self, action: Reverse, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
+from wfluid.device import exclusive
 from wfluid.kernels import rows
 
 CHUNK = 1024
@@ -18,6 +19,7 @@ class Counter:
         self.device = device
         self.step, self.going = (wp.zeros(n, dtype=wp.int32, device=device) for n in (2, 1))
 
+    @exclusive
     def set(self, row: int, end: int) -> None:
         """Begin at a row; the loop ends when it is at `end`."""
         self.step.assign(np.array([row, end], dtype=np.int32))
@@ -60,6 +62,7 @@ class Table:
         """Row n itself."""
         return self.array if not self.size else self.array[n * self.size : (n + 1) * self.size]
 
+    @exclusive
     def put(self, first: int, values: np.ndarray) -> None:
         """Write rows (count, size), from `first` on."""
         if values.size:

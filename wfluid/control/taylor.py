@@ -12,9 +12,12 @@ import numpy as np
 
 from wfluid.control.functional import Functional
 
-STEPS = (1e-5, 1e-4, 1e-3, 1e-2)
-"""h, beside what variables are scaled by: the smallest whose remainder is clear of rounding. Interpolation
-and limiters have kinks, and the fewer traces cross one on the way, the nearer the rate is to 2."""
+STEPS = (1e-5, 1e-4, 1e-3)
+"""The least h, beside what variables are scaled by: the first whose remainder is clear of rounding."""
+
+LADDER = (1, 4, 16, 64)
+"""Multiples of it over which the rate is fitted: where some of them cross a kink of interpolation or limiter,
+any two alone are a bad measure."""
 
 LEAST_RATE = 1.9
 """Below it a gradient is wrong."""
@@ -39,12 +42,13 @@ class Rate:
     remainder: float
     """The largest, as a part of the objective's change."""
     rate: float
-    """Median over directions; infinite where the objective is linear in these numbers."""
+    """Median over directions; infinite where the objective is linear in these numbers, nan where it does not
+    see them."""
 
     @property
     def holds(self) -> bool:
         """Whether the gradient is right."""
-        return self.rate >= LEAST_RATE
+        return not self.rate < LEAST_RATE
 
 
 def taylor_rates(functional: Functional, directions: int = 5, seed: int = 0) -> Iterator[Rate]:
@@ -72,12 +76,17 @@ def taylor_rates(functional: Functional, directions: int = 5, seed: int = 0) -> 
 def _rate(
     functional: Functional, m: np.ndarray, direction: np.ndarray, value: float, slope: float
 ) -> tuple[float, float]:
-    """The rate in one direction, and the remainder as a part of the change."""
-    for h in STEPS:
-        change = functional.value(m + 2 * h * direction) - value
-        left = abs(change - 2 * h * slope)
-        half = abs(functional.value(m + h * direction) - value - h * slope)
-        part = left / max(abs(change), abs(2 * h * slope), np.finfo(float).tiny)
-        if min(left, half) > ROUNDING * abs(value):
-            return float(np.log2(left / half)), part
-    return np.inf, part
+    """The rate in one direction, and the largest remainder as a part of the change."""
+
+    def remainder(h: float) -> tuple[float, float]:
+        change = functional.value(m + h * direction) - value
+        left = abs(change - h * slope)
+        return left, left / max(abs(change), abs(h * slope), np.finfo(float).tiny)
+
+    for least in STEPS:
+        left, part = remainder(least)
+        if left > ROUNDING * abs(value):
+            found = [(left, part), *(remainder(least * times) for times in LADDER[1:])]
+            lefts, parts = zip(*found, strict=True)
+            return float(np.polyfit(np.log2(LADDER), np.log2(lefts), 1)[0]), max(parts)
+    return np.inf if slope else np.nan, part

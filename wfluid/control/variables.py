@@ -109,14 +109,16 @@ class Variables:
         self._known = known_names(setup)
         self.slices: list[Slice] = []
         at = 0
+        if isinstance(free, Free) or not all(isinstance(one, Free) for one in free):
+            raise TypeError("free: expected a list of Free(name, …)")
         for one in free:
             for name in self._matching(one.name):
                 if any(name == other.name for other in self.slices):
                     raise ValueError(f"{name} is free twice")
                 values = self._get(name)
-                mask = (
-                    np.broadcast_to(True, values.shape) if one.parts is None else np.asarray(one.parts, bool)
-                )
+                mask = np.broadcast_to(True, values.shape) if one.parts is None else np.asarray(one.parts)
+                if mask.dtype != bool:
+                    raise ValueError(f"{name}: parts are a mask of True and False, not of {mask.dtype}")
                 if mask.shape != values.shape:
                     raise ValueError(f"{name}: parts of shape {mask.shape}, expected {values.shape}")
                 logarithm = name.rpartition(".")[2] in POSITIVE
