@@ -89,32 +89,29 @@ def even_segments(steps: int, room: int | None = None, breaks: Iterable[int] = (
     Raises:
         ValueError: not even the shortest fit, with the least that does.
     """
+    breaks = set(breaks)
     cuts = sorted({0, steps, *breaks})
     every = Schedule(tuple(pairwise(cuts)), keeps_all=True)
     if room is None or every.room <= room:
         return every
-    best = None
     for length in range(steps, 0, -1):
-        segments = tuple(pair for a, b in pairwise(cuts) for pair in _evenly(a, b, length))
-        schedule = Schedule(segments, keeps_all=False)
-        if schedule.room <= room:
-            return schedule
-        best = min(best or schedule, schedule, key=lambda s: s.room)
-    raise ValueError(f"room for {room} states: at least {min(best.room, every.room)} are needed")
+        if _room(cuts, length) <= room:
+            segments = tuple(pair for a, b in pairwise(cuts) for pair in _evenly(a, b, length))
+            return Schedule(segments, keeps_all=False)
+    raise ValueError(f"room for {room} states: at least {least_room(steps, breaks)} are needed")
 
 
 def least_room(steps: int, breaks: Iterable[int] = ()) -> int:
     """States that the least demanding schedule keeps or stores."""
-    breaks = set(breaks)
-    low, high = 1, steps + 1
-    while low < high:
-        middle = (low + high) // 2
-        try:
-            even_segments(steps, middle, breaks)
-            high = middle
-        except ValueError:
-            low = middle + 1
-    return low
+    cuts = sorted({0, steps, *breaks})
+    return min(steps + 1, *(_room(cuts, length) for length in range(1, steps + 1)))
+
+
+def _room(cuts: list[int], length: int) -> int:
+    """States that segments of at most so many steps, between the cuts, keep and store."""
+    counts = [-(-(b - a) // length) for a, b in pairwise(cuts)]
+    longest = max(-(-(b - a) // count) for (a, b), count in zip(pairwise(cuts), counts, strict=True))
+    return longest + 1 + sum(counts)
 
 
 def _evenly(start: int, end: int, length: int) -> list[tuple[int, int]]:
