@@ -12,17 +12,13 @@ are all that is needed (`wfluid.blobs` puts them together); they are summed alon
 import warp as wp
 from wfluid.kernels.cells import Field, Indices, Real, Uniform, adjoint_cells, adjoint_lines, inside
 from wfluid.kernels.forces import in_profile
+from wfluid.kernels.krylov import LANES, Lane
 
 ORDERS = wp.constant(5)
 """Powers of r that occur: 0 … 4."""
 
 MOMENTS = wp.constant(15)
 """Pairs of powers a, b with a + b <= 4, in the order of a, then b."""
-
-LANES = wp.constant(8)
-"""Partial sums a row keeps, so that additions need not wait for each other."""
-
-Lane = wp.types.vector(8, Real)
 
 
 @adjoint_lines
