@@ -17,6 +17,7 @@ from wfluid.composite import stretched
 from wfluid.device import kernels_are_built, open_device
 from wfluid.estimate import check_memory, estimate
 from wfluid.files import readable_size
+from wfluid.interrupt import HeldInterrupt
 from wfluid.output import check_folder, names, open_output
 from wfluid.picture import Picture, write_picture
 from wfluid.preview import draw_controls
@@ -217,8 +218,13 @@ def _write_frames(
 
     waiting: list[Future] = []
     try:
-        with ThreadPoolExecutor(1) as pool, _progress(animation.frame_count, quiet) as advance:
+        with (
+            HeldInterrupt() as interrupt,
+            ThreadPoolExecutor(1) as pool,
+            _progress(animation.frame_count, quiet) as advance,
+        ):
             for frame in animation.frames():
+                interrupt.check()
                 report.add(frame)
                 if len(waiting) >= QUEUED_FRAMES:
                     waiting.pop(0).result()
