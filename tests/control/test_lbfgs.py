@@ -324,6 +324,9 @@ def test_the_search_goes_back_from_where_there_is_nothing():
     assert found.ending is Ending.WOLFE
     assert found.sample.step == pytest.approx(0.95 * edge, rel=0.01)
     assert len(trials) < 20
+    too_far = [a for a in trials if a >= edge]
+    assert len(too_far) > 1 and too_far == sorted(too_far, reverse=True)
+    assert all(after < a for n, a in enumerate(trials) if a >= edge for after in trials[n + 1 :])
 
 
 def test_the_search_ends_at_the_edge_of_a_cliff():
@@ -352,6 +355,31 @@ def test_the_search_of_an_unbounded_line_ends():
     assert found.sample.step > 1e9
 
 
+def test_steps_grow_until_the_minimum_is_bracketed():
+    """Interpolation sees the minimum 5.5 of a parabola at once. From 1 it goes only 4 times the advance on,
+    from 5 at least 1.1 times, as the proof that searches end wants it (Moré and Thuente, section 2).
+    """
+    trials = []
+
+    def along(a):
+        trials.append(a)
+        return Sample(a, (a - 5.5) ** 2, 2 * (a - 5.5))
+
+    found = search(along, along(0.0), -math.inf, rules=Rules(1e-9, 1e-8))
+    np.testing.assert_allclose(trials, [0, 1, 5, 9.4, 5.5])
+    assert found.ending is Ending.WOLFE
+
+
+def test_the_search_comes_back_from_where_it_is_lower_but_not_enough():
+    """phi(a) = (exp(-100 a) - 1) / 100 - a / 10^5 falls for ever, below a slope of -1/1000 only to a = 10."""
+
+    def along(a):
+        return Sample(a, math.expm1(-100 * a) / 100 - 1e-5 * a, -math.exp(-100 * a) - 1e-5)
+
+    found = search(along, along(0.0), -math.inf, first=1000.0)
+    assert found.ending is Ending.WOLFE and 0 < found.sample.step < 11
+
+
 def test_slopes_decide_where_values_are_rounding():
     """phi = 1e6 + (a - 1)^2 / 1e11, of which values see nothing: the step is right by its slope."""
     start = Sample(0.0, 1e6, -2e-11)
@@ -360,6 +388,13 @@ def test_slopes_decide_where_values_are_rounding():
     assert abs(found.sample.slope) <= 0.9 * abs(start.slope)
     found = search(lambda a: Sample(a, 1e6 + 1e-4, 2e-11 * (a - 1)), start, 1e6 * (1 + 1e-15), first=0.5)
     assert found.sample is None, "the ceiling is no limit"
+
+    def overshot(a):
+        return Sample(a, 1e6 + 1e-10, 2e-11 * (a - 1))
+
+    assert search(overshot, start, 1e6 * (1 + 1e-15), first=1.5).ending is Ending.APPROXIMATE_WOLFE
+    rules = Rules(decrease=0.4, evaluations=1)
+    assert search(overshot, start, 1e6 * (1 + 1e-15), first=1.5, rules=rules).ending is Ending.EXHAUSTED
 
 
 # Functions that misbehave
@@ -400,6 +435,14 @@ def test_where_a_function_is_not_finite_the_step_was_too_far(function):
         assert found.status is Status.CONVERGED, found.message
         np.testing.assert_allclose(found.x, 1, atol=1e-6)
         assert found.evaluations < 60
+        for limit in range(1, found.evaluations):
+            recorded = Recorded(function) if function is not raising_barrier else Recorded(barrier)
+            part = minimise(
+                recorded, np.array([0.01, 3.0, 17.0]), Settings(first_step=first_step, evaluations=limit)
+            )
+            assert part.value == min(
+                v for _, v, g in recorded.points if np.isfinite(v) and np.isfinite(g).all()
+            )
 
 
 def test_errors_that_the_caller_asked_numpy_for_reach_the_function():
@@ -418,6 +461,22 @@ def test_errors_that_the_caller_asked_numpy_for_reach_the_function():
     assert found.status is Status.CONVERGED and raised
 
 
+def test_steps_beyond_all_numbers_are_too_far():
+    """Straight down for ever, so steep or in steps so long that the next x or slope is no number."""
+
+    def slope(x):
+        return -float(x[0]), -np.ones(1)
+
+    def cliff(x):
+        return -1e300 * float(np.tanh(x[0])), np.array([-1e300])
+
+    with np.errstate(all="raise"):
+        found = minimise(slope, np.ones(1), Settings(first_step=1e305, iterations=3))
+        assert found.status is Status.ITERATIONS and 1e307 < found.x[0] < math.inf
+        found = minimise(cliff, np.ones(1), Settings(first_step=1e10))
+        assert found.status is Status.NO_PROGRESS and found.evaluations == 1
+
+
 def raising(x):
     raise FloatingPointError
 
@@ -430,8 +489,9 @@ def test_a_start_that_is_not_finite_is_told(function):
     assert np.array_equal(found.x, np.ones(2))
 
 
-def test_a_flat_function_is_at_its_minimum():
-    found = minimise(lambda x: (7.0, np.zeros(3)), np.ones(3))
+@pytest.mark.parametrize("tolerance", [1e-6, 0.0])
+def test_a_flat_function_is_at_its_minimum(tolerance):
+    found = minimise(lambda x: (7.0, np.zeros(3)), np.ones(3), Settings(gradient_tolerance=tolerance))
     assert found.status is Status.CONVERGED
     assert (found.evaluations, found.iterations, found.value) == (1, 0, 7.0)
 
@@ -452,6 +512,7 @@ def test_a_memory_that_leads_nowhere_is_dropped():
     found = minimise(rosenbrock, bad, Settings(iterations=1))
     plain = minimise(rosenbrock, state, Settings(iterations=1))
     assert np.array_equal(found.x, plain.x)
+    assert found.evaluations == plain.evaluations, "it went along a direction that does not fall"
     assert len(found.state.steps) == 1 and found.state.steps[0] @ found.state.differences[0] > 0
 
 
@@ -569,6 +630,15 @@ def test_going_on_is_the_same_as_never_having_stopped(name):
         assert going_on.history == whole.history and going_on.status is whole.status
 
 
+def test_a_state_remembers_the_lowest_point():
+    """One that a line search went through and left: it is given back unless a lower one is found."""
+    state = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=3)).state
+    lower = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=20)).point
+    found = minimise(rosenbrock, replace(state, best=lower), Settings(iterations=5))
+    assert found.point is lower and found.state.best is lower
+    assert minimise(rosenbrock, found.state).value < lower.value
+
+
 def test_limits_of_iterations_are_kept():
     for limit in (0, 1, 5):
         found = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=limit))
@@ -677,3 +747,4 @@ def test_a_state_tells_where_it_is():
     minimise(quadratic, np.array([3.0, 4.0]), callback=states.append)
     for number, state in enumerate(states, start=1):
         assert state.iteration == number and state.value == state.values[-1] == quadratic(state.x)[0]
+        assert state.slopes[-1] == np.abs(state.gradient).max()

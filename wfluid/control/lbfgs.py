@@ -12,11 +12,11 @@ raises FloatingPointError, a step was too far.
 Settings
 
     memory              how many pairs s, y are kept; >= 1, 10. More (up to 30) saves evaluations where each
-                        is dear, at 4 n multiplications and 2 n numbers a pair.
+                        is dear, at 5 n multiplications and 2 n numbers a pair.
     gradient_tolerance  CONVERGED where max |g_i| <= this; >= 0, 1e-6. In units of f over units of x: set it
                         by what a change of x is worth to you. Zero: only where g = 0.
     change_tolerance    SMALL_CHANGE after an iteration with f_k - f_(k+1) <= this max(|f_k|, |f_(k+1)|);
-                        >= 0 and < 1, 0, which is never. Set 1e-4 or so where the last per mille is not worth
+                        >= 0 and < 1, 0, which is never. Set 1e-3 or so where the last per mille is not worth
                         its evaluations.
     iterations          at most so many, counted from the very first start; >= 0, 1000.
     evaluations         at most so many, likewise; >= 1, 2000. The number that costs time.
@@ -337,8 +337,8 @@ def _ahead(x: np.ndarray, step: float, direction: np.ndarray) -> np.ndarray:
 
 @np.errstate(all="ignore")
 def _slope(point: Point, direction: np.ndarray) -> float:
-    """Of the function along a direction; nan where it is not finite."""
-    return float(point.gradient @ direction) if point.is_finite else math.nan
+    """Of the function along a direction."""
+    return float(point.gradient @ direction)
 
 
 @np.errstate(all="ignore")

@@ -63,7 +63,7 @@ class Rules:
     decrease: float = 1e-3
     """Part of the decrease that the first slope promises which is enough."""
     curvature: float = 0.9
-    """Part of the first slope which is flat enough."""
+    """Part of the first slope which is flat enough; more than `decrease`, or there may be no such step."""
     width: float = 0.1
     """Part of a step within which it need not be known better: a bracket so short ends the search."""
     evaluations: int = 20
@@ -129,8 +129,9 @@ def _met(start: Sample, trial: Sample, ceiling: float, rules: Rules) -> Ending |
 class _Interval:
     """Where a step must lie that meets the conditions: between `low` and `high`, or beyond `low`.
 
-    While no trial has had enough decrease and a rising slope, trials that lack decrease are judged by
-    psi(a) = phi(a) - phi(0) - decrease a phi'(0) instead of phi (Moré and Thuente, section 3).
+    Trials that lack decrease but are no higher than `low` are judged by phi(a) - decrease a phi'(0), not phi:
+    its minimum meets both conditions, as decrease < curvature (Moré and Thuente, section 3; their second
+    stage is for curvature below decrease).
     """
 
     def __init__(self, start: Sample, tilt: float) -> None:
@@ -140,10 +141,9 @@ class _Interval:
         self.high: Sample | None = None
         """The other end of the bracket, once there is one."""
         self.wall = math.inf
-        """The least step that is known to be too far."""
+        """The last step that was too far: while there is no bracket, the least."""
         self.left = RETREAT
         self.widths = (math.inf, math.inf)
-        self.is_tilted = True
 
     @property
     def lowest(self) -> Sample | None:
@@ -157,8 +157,7 @@ class _Interval:
 
     def retreat(self, step: float) -> float:
         """The step after one that was too far."""
-        if self.high is None:
-            self.wall = step
+        self.wall = step
         step = self.low.step + self.left * (step - self.low.step)
         self.left **= 2
         return step
@@ -167,9 +166,7 @@ class _Interval:
         """Shorten the interval by a trial, and say where to go next."""
         self.left = RETREAT
         enough = self.start.value + self.tilt * trial.step
-        if trial.value <= enough and trial.slope >= 0:
-            self.is_tilted = False
-        tilt = self.tilt if self.is_tilted and enough < trial.value <= self.low.value else 0.0
+        tilt = self.tilt if enough < trial.value <= self.low.value else 0.0
         low, high, new = (sample and sample.tilted(tilt) for sample in (self.low, self.high, trial))
 
         advance = trial.step - low.step
@@ -235,7 +232,7 @@ def _cubic(a: Sample, b: Sample) -> float:
     theta = 3 * (a.value - b.value) / length + a.slope + b.slope
     scale = max(abs(theta), abs(a.slope), abs(b.slope))
     square = (theta / scale) ** 2 - (a.slope / scale) * (b.slope / scale)
-    if not square > 0:
+    if square < 0:
         return math.nan
     gamma = math.copysign(scale * math.sqrt(square), length)
     return a.step + (gamma - a.slope + theta) / (2 * gamma - a.slope + b.slope) * length
