@@ -88,6 +88,11 @@ class State:
         ]
 
     @property
+    def fields(self) -> list[wp.array]:
+        """Every array over the grid."""
+        return [self.u, self.v, self.d_x, self.d_y, self.q, *self.rho]
+
+    @property
     def particles(self) -> list[wp.array]:
         """Where points are along x and y."""
         return [self.p_x, self.p_y]
@@ -99,6 +104,11 @@ class State:
             for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
         )
         return State(self.grid, u, v, d_x, d_y, q, tuple(rho[:] for rho in self.rho), p_x, p_y)
+
+    def copy(self) -> State:
+        """The same values in arrays of their own."""
+        u, v, d_x, d_y, q, *rho = (wp.clone(a, requires_grad=False) for a in self.fields)
+        return State(self.grid, u, v, d_x, d_y, q, tuple(rho), wp.clone(self.p_x), wp.clone(self.p_y))
 
     def take_gradient(self, bar: State) -> None:
         """Let the arrays of `bar` hold the gradients."""

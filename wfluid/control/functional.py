@@ -15,7 +15,9 @@ which a fluid's own is lowered here); and with respect to viscosity it is right 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,6 +49,16 @@ JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Most that conjugate gradients may leave undone of a solve."""
 
 
+@dataclass
+class Seconds:
+    """Where the time of evaluations went [s]."""
+
+    forward: float = 0.0
+    """Simulations."""
+    backward: float = 0.0
+    """Their adjoints."""
+
+
 class Functional:
     """An objective of a run, as a function of the run's free numbers.
 
@@ -69,10 +81,15 @@ class Functional:
         free: Sequence[Free],
         *,
         velocity: np.ndarray | None = None,
+        begin: tuple[float, State] | None = None,
+        end: float | None = None,
         memory_mb: float | None = None,
         device: str | None = None,
     ):
         """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
+
+        With `begin`, a time [s] and the fluid at that time (`state_after`), the run goes on from there; the
+        objective's points are then places at that time. It ends with the timeline, or at the time `end`.
 
         `memory_mb` caps what the states of the run take, by far the most of its memory; with less room most
         steps are computed twice.
@@ -90,6 +107,17 @@ class Functional:
         _check_solves(fluid, of_viscosity)
         if memory_mb is not None and not (np.isfinite(memory_mb) and memory_mb > 0):
             raise ValueError(f"memory_mb {memory_mb}: expected a positive number of megabytes")
+        if begin is not None and velocity.any():
+            raise ValueError("a run begins with a velocity or with a state, not with both")
+        self._first, self._last = 0, timeline.steps
+        if end is not None:
+            self._last = self._step_of(end)
+        if begin is not None:
+            start, state = begin
+            if state.grid != grid or len(state.rho) != len(fluid.densities):
+                raise ValueError("a run begins with a state of its own grid and densities")
+            self._first = self._step_of(start)
+            begin = (self._first, state)
         stages = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[Term]] = {}
@@ -110,13 +138,17 @@ class Functional:
         if not np.all((points >= 0) & (points <= (grid.width, grid.height))):
             raise ValueError("an objective's particles must begin within the picture")
         self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
-        self._recording = Recording(stages, setup, timeline, points, terms, memory_mb, of_viscosity, effort)
-        self.evaluations = 0
+        self._recording = Recording(
+            stages, setup, timeline, points, terms, memory_mb, of_viscosity, effort, begin, self._last
+        )
+        self.evaluations, self.seconds = 0, Seconds()
 
     start: np.ndarray
     """The free numbers of the fluid and forces given, as a vector."""
     evaluations: int
     """How often a value has been asked for."""
+    seconds: Seconds
+    """Where the time of evaluations went."""
 
     @property
     def memory(self) -> int:
@@ -140,6 +172,16 @@ class Functional:
         """
         return self._forward(m)[0]
 
+    def state_after(self, m: np.ndarray) -> State:
+        """The fluid at the end of the run with the vector m.
+
+        Raises:
+            ValueError: as `value`.
+            FloatingPointError: as `value`.
+        """
+        self._forward(m)
+        return self._recording.end()
+
     def value_and_gradient(self, m: np.ndarray) -> tuple[float, np.ndarray]:
         """The objective at m and its gradient, of the length of m.
 
@@ -148,6 +190,7 @@ class Functional:
             FloatingPointError: the run or the gradient is not finite; with the step where that begins.
         """
         value, pulls = self._forward(m)
+        began = time.perf_counter()
         found = self._recording.backward(pulls)
         gradient = self.variables.pull_back(self._gradients(found), np.asarray(m, dtype=np.float64))
         if not np.all(np.isfinite(gradient)):
@@ -156,12 +199,13 @@ class Functional:
             slices = self.variables.slices
             wrong = [one.name for one in slices if not np.all(np.isfinite(gradient[one.entries]))]
             raise FloatingPointError(f"the gradient with respect to {', '.join(wrong)} is not finite")
+        self.seconds.backward += time.perf_counter() - began
         return value, gradient
 
     def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray]]:
         """The value, and the gradients with respect to the particles' places by step."""
         self.evaluations += 1
-        recording = self._recording
+        began, recording = time.perf_counter(), self._recording
         self._setup = self.variables.unpack(m)
         recording.set(self._setup)
         places = recording.forward(self._looked_at)
@@ -180,6 +224,7 @@ class Functional:
                 else f"the fluid is not finite from step {step} ({recording.time_of(step):.4g} s) on: "
                 "smaller forces or steps help"
             )
+        self.seconds.forward += time.perf_counter() - began
         return value, pulls
 
     def _refuse(self, step: int, bar: State) -> None:
@@ -214,23 +259,23 @@ class Functional:
                     gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
 
     def _step_of(self, t: float) -> int:
-        """The step at whose end a time falls.
+        """How many steps of the run end up to a time.
 
         Raises:
             ValueError: outside the run, or between two steps.
         """
         timeline = self.timeline
-        end = timeline.end
-        if not 0 < t <= end * (1 + 1e-9):
-            raise ValueError(f"an objective at {t:g} s: expected a time after 0 and up to {end:g} s")
+        start, end = (timeline.time_of(step) for step in (self._first, self._last))
+        if not start < t <= end * (1 + 1e-9):
+            raise ValueError(f"an objective at {t:g} s: expected a time after {start:g} and up to {end:g} s")
         step = round(t / timeline.dt)
-        if abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt or step == 0:
+        if abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt or step == self._first:
             before, after = (timeline.time_of(int(t / timeline.dt) + n) for n in (0, 1))
             raise ValueError(
                 f"an objective at {t:g} s falls between steps, at {before:.6g} s and {after:.6g} s: choose "
                 "fps and substeps so that it falls on one"
             )
-        return step
+        return step - self._first
 
 
 def _check_solves(fluid: Fluid, free: bool) -> None:

@@ -56,6 +56,8 @@ class Reversed:
 class Recording:
     """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
 
+    Its steps count from 0 at rest, or from `begin`: a step of the timeline and the state it starts with; they
+    end with the timeline's, or before the timeline's step `last`.
     `terms` are objectives of the state after some steps. With `effort` half the squares of what forces add
     count too.
 
@@ -74,9 +76,12 @@ class Recording:
         memory_mb: float | None = None,
         of_viscosity: bool = False,
         effort: float = 0.0,
+        begin: tuple[int, State] | None = None,
+        last: int | None = None,
     ):
         self.stages, self.timeline, self.device = stages, timeline, stages.device
-        self.steps = timeline.steps
+        self._first, self._begun = begin or (0, None)
+        self.steps = (timeline.steps if last is None else last) - self._first
         self._terms, self._points = terms, points
         self._term_replays: dict[Callable, Replay] = {}
         grid, device = stages.grid, stages.device
@@ -145,7 +150,7 @@ class Recording:
 
     def time_of(self, step: int) -> float:
         """When a step begins [s]."""
-        return self.timeline.time_of(step)
+        return self.timeline.time_of(self._first + step)
 
     @exclusive
     def set(self, setup: Setup) -> None:
@@ -156,12 +161,14 @@ class Recording:
         """
         self._setup, stages, dt = setup, self.stages, self.timeline.dt
         rows, swelled = [], False
-        for step in range(self.steps):
-            kept = stages.kept(dt, dt if step else 0.0, swelled)
+        before = min(1, self._first)  # the step before decides what of its pressure is kept
+        for step in range(-before, self.steps):
+            kept = stages.kept(dt, dt if self._first + step else 0.0, swelled)
             t, until = self.time_of(step), self.time_of(step + 1)
             rows.append(self._impulses.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
             swelled = self._impulses.prescribed > 0
-        self._all_numbers, self._all_boxes = (np.stack(column) for column in zip(*rows, strict=True))
+        columns = zip(*rows[before:], strict=True)
+        self._all_numbers, self._all_boxes = (np.stack(column) for column in columns)
         stages.take_fluid(setup.fluid)
         if self._viscosities:
             plan = stages.expect([self.time_of(step + 1) for step in range(self.steps)], dt)
@@ -265,6 +272,11 @@ class Recording:
         """What the last `forward` found of effort and of the terms."""
         return self._value
 
+    @exclusive
+    def end(self) -> State:
+        """A copy of the state at the end of the last `forward`."""
+        return self._before.copy()
+
     @property
     def finite(self) -> bool:
         """Whether the fluid was at the end of the last `forward`; what is not finite spreads, and stays."""
@@ -360,14 +372,18 @@ class Recording:
 
     @exclusive
     def _begin(self) -> None:
-        """The state at the beginning: at rest but for the velocity."""
+        """The state at the beginning: what was given, or at rest but for the velocity."""
         state, stages, grid = self._before, self.stages, self.stages.grid
-        for a in state.arrays:
+        for p, column, h in zip(state.particles, self._points.T, (grid.hx, grid.hy), strict=True):
+            p.assign(column / h)
+        if self._begun:
+            for a, b in zip(self._begun.fields, state.fields, strict=True):
+                wp.copy(b, a)
+            return
+        for a in state.fields:
             a.zero_()
         for density, rho in zip(stages.densities, state.rho, strict=True):
             density.begin(rho)
-        for p, column, h in zip(state.particles, self._points.T, (grid.hx, grid.hy), strict=True):
-            p.assign(column / h)
         pairs = zip(self._setup.velocity, (state.u, state.v), stages.velocity_ghosts, strict=True)
         for values, f, ghosts in pairs:
             from_numpy(values, f, stages.layout)
