@@ -9,7 +9,8 @@ import numpy as np
 
 from wfluid.animation import Animation
 from wfluid.control.functional import Functional
-from wfluid.control.objectives import DensityMisfit, MapMisfit, Objective
+from wfluid.control.keyframes import Aims, ParticleKeyframe
+from wfluid.control.objectives import DensityMisfit, MapMisfit, Objective, ParticleMisfit, Sum
 from wfluid.control.taylor import LEAST_RATE, taylor_rates
 from wfluid.control.variables import POSITIVE, VELOCITY, VISCOSITY, Free, Setup, known_names
 from wfluid.fluid import Fluid
@@ -17,7 +18,7 @@ from wfluid.forces import flat
 from wfluid.grid import Grid
 from wfluid.kernels.cells import Real
 from wfluid.scene import Scene
-from wfluid.staging import stage
+from wfluid.staging import stage_all
 
 TIGHT = 1e-12
 """Tolerance of the solves, so that the gradient with respect to viscosity is exact too."""
@@ -31,16 +32,21 @@ EXIT_WRONG = 1
 def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
     """Test every number of a scene that has a gradient; print a table; 1 if one is wrong, else 0.
 
-    The objective is the mean square of the displacement, and of densities, at the end.
+    The objective is the misfit of its keyframes, if it has some; else the mean square of the displacement,
+    and of densities, at the end. Forces that were found for its keyframes act too.
 
     Raises:
         ValueError: a scene that has nothing to vary, or that cannot run.
     """
-    animation = stage(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
-    functional = _functional(replace(animation, cells=cells))
+    animation, aims = stage_all(
+        scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr)
+    )
+    functional = _functional(replace(animation, cells=cells), aims)
     grid, steps = functional.grid, functional.timeline.steps
-    seen = " and ".join(["the displacement", *animation.fluid.density_names])
-    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: mean square of {seen}")
+    seen = "mean square of " + " and ".join(["the displacement", *animation.fluid.density_names])
+    if aims:
+        seen = f"misfit of {len(aims.keyframes)} keyframes"
+    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: {seen}")
     print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
     wrong = 0
     for rate in taylor_rates(functional, seed=seed):
@@ -54,15 +60,27 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
     return EXIT_WRONG if wrong else 0
 
 
-def _functional(animation: Animation) -> Functional:
+def _functional(animation: Animation, aims: Aims | None) -> Functional:
     """A functional of everything in an animation that can vary."""
     grid, timeline, device = animation.grid, animation.timeline, animation.device
     fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
-    setup = Setup(fluid, flat(animation.forces), np.zeros((2, grid.ny, grid.nx)))
+    found = aims.found if aims else ()
+    setup = Setup(fluid, (*flat(animation.forces), *found), np.zeros((2, grid.ny, grid.nx)))
     names = [name for name in known_names(setup) if not _held(name, setup)]
     free = [Free(name, _scale(name, setup)) for name in names]
-    objective = _objective(grid, fluid, timeline.end)
+    objective = _misfit(aims) if aims else _objective(grid, fluid, timeline.end)
     return Functional(grid, fluid, setup.forces, timeline, objective, free, device=device)
+
+
+def _misfit(aims: Aims) -> Objective:
+    """The misfits of keyframes and pins."""
+    pins = [ParticleKeyframe(pin, pin, max(one.time for one in aims.keyframes)) for pin in aims.pins]
+    return Sum(
+        tuple(
+            (one.weight, ParticleMisfit([one.point], [one.destination], one.time))
+            for one in (*aims.keyframes, *pins)
+        )
+    )
 
 
 def _objective(grid: Grid, fluid: Fluid, end: float) -> Objective:

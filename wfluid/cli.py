@@ -1,4 +1,4 @@
-"""The command line: wfluid animate, render, check-gradient, warmup; wfluid --version.
+"""The command line: wfluid animate, keyframes, render, check-gradient, warmup; wfluid --version.
 
 Exit codes: 0 done, 1 the run failed, 2 bad input (one line on stderr), 130 interrupted.
 """
@@ -17,7 +17,11 @@ from typing import NoReturn
 
 EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
+KEYFRAMES_EXAMPLE = "wfluid keyframes cat.png -o look.gif --move 210,160:230,140 --pin 300,220"
 EXAMPLE = "wfluid animate raccoon.jpg -o nose.gif --push 621,451:22,15:period=1,radius=55"
+
+
+_PLOT = {"metavar": "FILE.png", "help": "draw arrows, ways, deformed grid and convergence of keyframes"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -112,38 +116,29 @@ def _parser() -> Parser:
     animate.set_defaults(run=run_animate)
     animate.add_argument("picture", metavar="PICTURE", help="the picture to animate")
     _drawn(animate)
-    number = animate.add_argument
-    number("--track", metavar="X,Y", action="append", default=[], help="follow this point; repeatable")
-    number("--tracks", metavar="FILE.csv", help="write where the followed points go")
-    number(
-        "--layer",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="a picture or matte that goes through the same map, written beside OUT as OUT_FILE; repeatable",
-    )
-    number("--cells", type=int, help="cells along the longer side (256)")
-    number("--walls", help="free-slip (default), no-slip, periodic, or two of them as X,Y")
-    number("--scheme", help="standard (default), or paper: Euler, bilinear, Jacobi, phase 0")
-    number("--solver", help="multigrid (default) or jacobi")
-    number("--pressure-cycles", type=int, help="multigrid cycles a projection (3)")
-    number("--fps", type=float, help="frames a second (15)")
-    number("--duration", type=float, help="length [s] (2)")
-    number("--substeps", type=int, help="steps a frame (so many that dt <= 1/96 s)")
-    number("--loop", help="oscillate, pingpong or crossfade: the end meets the beginning")
-    number("--seed", type=int, help="of noises that name none (0)")
-    number("--width", type=int, help="width of the frames [px] (the picture's)")
-    number("--scale", type=float, help="size of the frames as a factor, instead of --width")
-    number("--filter", help="nearest, bilinear, cubic or lanczos (cubic)")
-    number("--edge", help="clamp, mirror, wrap or transparent (clamp)")
-    number("--colorspace", help="what the picture's numbers are: auto, srgb, linear (auto)")
-    number("--start", type=int, help="number of a sequence's first frame (1001)")
-    number("--type", help="numbers of a sequence: uint8, uint16, half, float (the picture's)")
-    number("--compression", help="of EXR (zip, piz, dwaa, …) and TIFF (lzw, zip, …) sequences")
-    number("--quality", type=int, help="of JPEG and WebP sequences, 1 … 100")
-    number("--save-scene", metavar="FILE.toml", help="write what this command line says as a scene")
+    _shot(animate)
     _running(animate)
     _common(animate)
+    keyframes = verbs.add_parser(
+        "keyframes",
+        help="send points of a picture to places",
+        description="Send points of a picture to places, in time: the forces that do it are found. "
+        "Exits with 1 if a point stays away from its place by more than the tolerance.",
+        epilog=f"example: {KEYFRAMES_EXAMPLE}",
+    )
+    keyframes.set_defaults(run=run_animate)
+    keyframes.add_argument("picture", metavar="PICTURE", help="the picture to animate")
+    add = keyframes.add_argument
+    add("--move", **_repeated("X0,Y0:X1,Y1[@T]", "the point X0,Y0 should be at X1,Y1 at T seconds [px]"))
+    add("--pin", **_repeated("X,Y", "this point should stay [px]"))
+    add("--points", metavar="FILE.csv", help="moves in a file: from x, from y, to x, to y[, seconds]")
+    add("--time", type=float, help="when points arrive whose time is not given [s] (1, or the duration)")
+    add("--plot", **_PLOT)
+    add("--tolerance", type=float, help="how far from its place a point may end [px] (0.25 of 512)")
+    _drawn(keyframes)
+    _shot(keyframes)
+    _running(keyframes)
+    _common(keyframes)
     render = verbs.add_parser(
         "render",
         help="run a scene file",
@@ -153,6 +148,7 @@ def _parser() -> Parser:
     render.set_defaults(run=run_render)
     render.add_argument("scene", metavar="SCENE.toml", help="the scene")
     render.add_argument("--keys", action=Keys, nargs=0, help="print every key of a scene, as Markdown")
+    render.add_argument("--plot", **_PLOT)
     render.add_argument("-o", "--output", **_repeated("OUT", "write the picture here instead"))
     render.add_argument(
         "--set", **_repeated("KEY=VALUE", "change a value, such as time.duration=1 or force.nose.radius=40")
@@ -183,6 +179,40 @@ def _parser() -> Parser:
     warmup.set_defaults(run=run_warmup)
     _common(warmup)
     return parser
+
+
+def _shot(parser: argparse.ArgumentParser) -> None:
+    """The flags of grid, time and frames."""
+    number = parser.add_argument
+    number("--track", metavar="X,Y", action="append", default=[], help="follow this point; repeatable")
+    number("--tracks", metavar="FILE.csv", help="write where the followed points go")
+    number(
+        "--layer",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="a picture or matte that goes through the same map, written beside OUT as OUT_FILE; repeatable",
+    )
+    number("--cells", type=int, help="cells along the longer side (256)")
+    number("--walls", help="free-slip (default), no-slip, periodic, or two of them as X,Y")
+    number("--scheme", help="standard (default), or paper: Euler, bilinear, Jacobi, phase 0")
+    number("--solver", help="multigrid (default) or jacobi")
+    number("--pressure-cycles", type=int, help="multigrid cycles a projection (3)")
+    number("--fps", type=float, help="frames a second (15)")
+    number("--duration", type=float, help="length [s] (2; of keyframes, to the last)")
+    number("--substeps", type=int, help="steps a frame (so many that dt <= 1/96 s; for keyframes 1/48 s)")
+    number("--loop", help="oscillate, pingpong or crossfade: the end meets the beginning")
+    number("--seed", type=int, help="of noises that name none (0)")
+    number("--width", type=int, help="width of the frames [px] (the picture's)")
+    number("--scale", type=float, help="size of the frames as a factor, instead of --width")
+    number("--filter", help="nearest, bilinear, cubic or lanczos (cubic)")
+    number("--edge", help="clamp, mirror, wrap or transparent (clamp)")
+    number("--colorspace", help="what the picture's numbers are: auto, srgb, linear (auto)")
+    number("--start", type=int, help="number of a sequence's first frame (1001)")
+    number("--type", help="numbers of a sequence: uint8, uint16, half, float (the picture's)")
+    number("--compression", help="of EXR (zip, piz, dwaa, …) and TIFF (lzw, zip, …) sequences")
+    number("--quality", type=int, help="of JPEG and WebP sequences, 1 … 100")
+    number("--save-scene", metavar="FILE.toml", help="write what this command line says as a scene")
 
 
 def _repeated(metavar: str, text: str) -> dict:
@@ -283,8 +313,15 @@ def run_check_gradient(options: argparse.Namespace) -> int:
 def _run(scene, options: argparse.Namespace) -> int:
     from wfluid.render import Run, run_scene
 
-    save = getattr(options, "save_scene", None)
-    return run_scene(scene, Run(options.device, options.quiet, options.dry_run, options.preview, save))
+    how = Run(
+        device=options.device,
+        quiet=options.quiet,
+        dry_run=options.dry_run,
+        preview=options.preview,
+        save_scene=getattr(options, "save_scene", None),
+        plot=getattr(options, "plot", None),
+    )
+    return run_scene(scene, how)
 
 
 def _show_warning(message, *_, **__) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wfluid.output import numbering
+from wfluid.point_file import read_points
 from wfluid.scene import Scene
 from wfluid.scene_format import FORCES, VERSION
 from wfluid.schema import SchemaError, checked
@@ -55,10 +56,18 @@ _FLAGS = {
     ("freeze", "strength"): "--freeze MASK:strength",
     **_flags(("time",), keys=_OF_TIME),
     **_flags(("frames",), keys=_OF_FRAMES),
+    ("keyframes", "tolerance"): "--tolerance",
+    ("keyframes", "pins"): "--pin",
     ("tracks",): "--track",
     **_flags(*(("output", n) for n in range(8)), keys=_OF_STILLS),
 }
 """The flags by the keys that they set."""
+
+KEYFRAME_TIME = 1.0
+"""When points arrive that no time is given for [s]."""
+
+KEYFRAME_VISCOSITY = 0.005
+"""Viscosity where keyframes are on the command line and none is [longer side^2/s]: strains spread wider."""
 
 _DENSITY_KEYS = ("diffusion", "lift")
 """Keys of a poured density that are not its source's."""
@@ -198,6 +207,9 @@ def scene_of(options: argparse.Namespace) -> Scene:
             if lift:
                 flags["force", len(tables["force"])] = f"--{look} {text}"
                 tables["force"].append(lift)
+    if options.verb == "keyframes":
+        tables["keyframes"], names = _keyframes(options)
+        flags |= {("keyframes", "move", n): name for n, name in enumerate(names)}
     tables["layer"] = [{"name": _layer_name(file), "file": file} for file in options.layer]
     flags |= {("layer", n): f"--layer {file}" for n, file in enumerate(options.layer)}
     if options.track:
@@ -207,6 +219,39 @@ def scene_of(options: argparse.Namespace) -> Scene:
     tables["output"] = _outputs(options)
     given = {key: value for key, value in tables.items() if value}
     return Scene(given, source="command line", flags=flags)
+
+
+def parse_move(text: str) -> dict[str, Any]:
+    """The table of a move from its short form, "X0,Y0:X1,Y1" or "X0,Y0:X1,Y1@SECONDS".
+
+    Raises:
+        ValueError: naming the part that is wrong.
+    """
+    what = f"move {text!r}"
+    places, at, time = text.partition("@")
+    parts = places.split(":")
+    if len(parts) != 2:
+        raise ValueError(f"{what}: expected X0,Y0:X1,Y1 or X0,Y0:X1,Y1@SECONDS")
+    start, end = (_pair(what, "a point X,Y", part) for part in parts)
+    return {"from": start, "to": end, **({"time": _number(what, "time", time)} if at else {})}
+
+
+def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
+    """Moves, those of a file among them, and pins; and what of the command line each move comes from."""
+    if not (options.move or options.points):
+        raise ValueError("where to? give at least one --move X0,Y0:X1,Y1[@T], or --points FILE.csv")
+    moves = [parse_move(text) for text in options.move]
+    names = [f"--move {text}" for text in options.move]
+    for row in read_points(options.points) if options.points else ():
+        moves.append({"from": list(row.source), "to": list(row.target)})
+        if row.time is not None:
+            moves[-1]["time"] = row.time
+        names.append(f"--points {options.points}:{row.line}")
+    latest = next(time for time in (options.time, options.duration, KEYFRAME_TIME) if time is not None)
+    table: dict[str, Any] = {"move": [{**move, "time": move.get("time", latest)} for move in moves]}
+    if options.pin:
+        table["pins"] = [_pair(f"pin {text!r}", "the point X,Y", text) for text in options.pin]
+    return {**table, **_given(options, "tolerance")}, names
 
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, Any]:
@@ -219,8 +264,11 @@ def _viscosity(options: argparse.Namespace) -> dict[str, Any]:
         for flag in ("viscosity_floor", "invert_viscosity", "viscosity_moves"):
             if getattr(options, flag) is not None and getattr(options, flag) is not False:
                 raise ValueError(f"--{flag.replace('_', '-')} needs a --viscosity-image")
+    value = options.viscosity
+    if options.verb == "keyframes" and value is None and options.viscosity_image is None:
+        value = KEYFRAME_VISCOSITY
     given = {
-        "value": options.viscosity,
+        "value": value,
         "image": options.viscosity_image,
         "floor": options.viscosity_floor,
         "invert": options.invert_viscosity or None,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wfluid.animation import Animation
+from wfluid.control.keyframes import Aims
 from wfluid.drawing import DEFAULT_RADIUS
 from wfluid.forces import flat
 from wfluid.painted import Painted
@@ -28,8 +29,9 @@ Line = Sequence[tuple[float, float]]
 """A polyline in pixels."""
 
 
-def draw_controls(scene: Scene, animation: Animation) -> Picture:
-    """The picture with what is drawn on it: arrows, circles at radii (one sigma), paths, followed points.
+def draw_controls(scene: Scene, animation: Animation, aims: Aims | None = None) -> Picture:
+    """The picture with what is drawn on it: arrows, circles at radii (one sigma), paths, followed points;
+    keyframes as arrows, pins as crosses.
 
     A painted viscosity and what is frozen are tinted, orange and blue; what an effect mask spares is
     dark.
@@ -47,7 +49,12 @@ def draw_controls(scene: Scene, animation: Animation) -> Picture:
     for number, lines in enumerate(shapes):
         for line in lines:
             canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
-    for x, y in scene.tables.get("tracks", {}).get("points", []):
+    for number, keyframe in enumerate(aims.keyframes if aims else ()):
+        start, tip = (tuple(side * value for value in at) for at in (keyframe.point, keyframe.destination))
+        for line in _arrow(start, tip, side):
+            canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
+    pins = [(x * side, y * side) for x, y in aims.pins] if aims else []
+    for x, y in [*scene.tables.get("tracks", {}).get("points", []), *pins]:
         arm = 0.01 * side
         for line in ([(x - arm, y), (x + arm, y)], [(x, y - arm), (x, y + arm)]):
             canvas.draw([(a * stretch[0], b * stretch[1]) for a, b in line], (1.0, 1.0, 1.0))

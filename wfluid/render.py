@@ -14,17 +14,24 @@ import numpy as np
 
 from wfluid.animation import Animation, Frame
 from wfluid.composite import stretched
+from wfluid.control.keyframes import Aims
+from wfluid.control.match import REACHED, STOPPED, Match, match_keyframes
+from wfluid.control.search import Progress
 from wfluid.device import kernels_are_built, open_device
 from wfluid.estimate import check_memory, estimate
 from wfluid.files import readable_size
 from wfluid.interrupt import HeldInterrupt
+from wfluid.keyframe_plot import plot_match
 from wfluid.output import check_folder, names, open_output
 from wfluid.picture import Picture, write_picture
 from wfluid.preview import draw_controls
+from wfluid.progress import FrameProgress, SearchProgress
 from wfluid.report import Report, write_report
 from wfluid.scene import Output, Scene, write_scene
-from wfluid.staging import stage
+from wfluid.staging import stage_all, with_found
 from wfluid.tracks import Tracks
+
+EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 
 QUEUED_FRAMES = 4
 """Frames that may wait for the disk while the next ones are computed."""
@@ -47,6 +54,8 @@ class Run:
     """Draw the controls on the picture to this file, and stop."""
     save_scene: str | None = None
     """Write the scene to this file, and go on if there is an output."""
+    plot: str | None = None
+    """Draw what keyframes came to, to this file."""
 
 
 class _Writer(Protocol):
@@ -64,14 +73,16 @@ def run_scene(scene: Scene, how: Run) -> int:
     """
     began = time.perf_counter()
     tables = scene.tables
-    if not any(tables.get(key) for key in ("force", "density")):
+    if not any(tables.get(key) for key in ("force", "density", "keyframes")):
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
-    if not (scene.outputs or how.preview or how.save_scene or how.dry_run):
+    if how.plot and "keyframes" not in tables:
+        raise ValueError("--plot draws keyframes: the scene has none")
+    if not (scene.outputs or how.preview or how.save_scene or how.plot or how.dry_run):
         raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
     _check_names(scene, how)
 
     notes: list[str] = []
-    animation = stage(scene, how.device, notes.append)
+    animation, aims = stage_all(scene, how.device, notes.append)
     check_memory(animation, _kept_frames(scene.outputs))
     writers = [] if how.preview or how.dry_run else _writers(scene, animation)
 
@@ -81,24 +92,34 @@ def run_scene(scene: Scene, how: Run) -> int:
 
     for text in notes:  # said only now: what is refused is one line
         note(text)
-    if how.save_scene:
-        write_scene(how.save_scene, _with_size(scene, animation.picture))
+    sized = _with_size(scene, animation.picture)
+    searches = aims is not None and not (how.preview or how.dry_run)
+    if how.save_scene and not searches:
+        write_scene(how.save_scene, sized)
     if how.dry_run:
         _say_plan(animation, scene.outputs)
         return 0
     if how.preview:
-        write_picture(how.preview, draw_controls(scene, animation))
-    if how.preview or not scene.outputs:
+        write_picture(how.preview, draw_controls(scene, animation, aims))
+    if how.preview or not (scene.outputs or searches):
         return 0
     _load(animation, how.quiet)
-    report = Report(animation)
-    writing = _write_frames(animation, writers, report, how.quiet)
-    _judge_loop(animation, report, note)
-    times = {"write": writing, "total": time.perf_counter() - began}
-    for output in scene.outputs:
-        if output.of == "report":
-            write_report(output.file, report.as_dict(times))
-    return 0
+    match = _matched(animation, aims, how) if searches else None
+    if match:
+        animation = match.animation
+        if how.save_scene:
+            write_scene(how.save_scene, with_found(sized, match.found, aims.side))
+        if how.plot:
+            plot_match(match, how.plot)
+    if scene.outputs:
+        report = Report(animation, match, aims.side if aims else 1.0)
+        writing = _write_frames(animation, writers, report, how.quiet)
+        _judge_loop(animation, report, note)
+        times = {"write": writing, "total": time.perf_counter() - began}
+        for output in scene.outputs:
+            if output.of == "report":
+                write_report(output.file, report.as_dict(times))
+    return _judge_match(match, aims.side) if match else 0
 
 
 def _with_size(scene: Scene, picture: Picture) -> Scene:
@@ -115,7 +136,11 @@ def _check_names(scene: Scene, how: Run) -> None:
     taken[(scene.folder / scene.tables["picture"]["file"]).resolve()] = "the picture itself"
     taken[Path(scene.source).resolve()] = "the scene itself"
     written = [(output.file, f"written as the {output.of}", output.start) for output in scene.outputs]
-    for flag, name in (("--preview", how.preview), ("--save-scene", how.save_scene)):
+    for flag, name in (
+        ("--preview", how.preview),
+        ("--save-scene", how.save_scene),
+        ("--plot", how.plot),
+    ):
         if name is not None:
             written.append((Path(name), f"written by {flag}", 0))
     for path, what, start in written:
@@ -130,6 +155,38 @@ def _check_names(scene: Scene, how: Run) -> None:
     ):
         if path.suffix.lower() != ending:
             raise ValueError(f"{path}: {flag} is written as {ending}")
+
+
+def _matched(animation: Animation, aims: Aims, how: Run) -> Match:
+    """Find the forces of keyframes, saying how far the search is; Ctrl-C ends it with the best so far."""
+    with HeldInterrupt() as interrupt, SearchProgress(aims.side, how.quiet) as show:
+
+        def heed(at: Progress) -> bool:
+            show(at)
+            return interrupt.wanted
+
+        return match_keyframes(
+            animation,
+            aims.keyframes,
+            pins=aims.pins,
+            start=aims.found,
+            tolerance=aims.tolerance,
+            seed=aims.seed,
+            progress=heed,
+            side=aims.side,
+        )
+
+
+def _judge_match(match: Match, side: float) -> int:
+    """Say which points are not where they should be; the exit code."""
+    if match.status == REACHED:
+        return 0
+    worst = match.residual * side
+    print(f"wfluid: {match.status}: the farthest point is {worst:.3g} px from its keyframe", file=sys.stderr)
+    for arrival in match.arrivals:
+        if arrival.residual > match.tolerance:
+            print(f"wfluid: {arrival.said(side)}", file=sys.stderr)
+    return EXIT_INTERRUPTED if match.status == STOPPED else EXIT_FAILED
 
 
 def _kept_frames(outputs: Sequence[Output]) -> int:
@@ -221,7 +278,7 @@ def _write_frames(
         with (
             HeldInterrupt() as interrupt,
             ThreadPoolExecutor(1) as pool,
-            _progress(animation.frame_count, quiet) as advance,
+            FrameProgress(animation.frame_count, quiet) as advance,
         ):
             for frame in animation.frames():
                 interrupt.check()
@@ -254,40 +311,3 @@ def _finished(writers: Sequence[tuple[_Writer, Callable[[Frame], None]]]) -> str
         ends = [str(path) for path in writer.written[:1] + writer.written[1:][-1:]]
         found.append((" … " if len(writer.written) > 2 else ", ").join(ends))
     return ", ".join(filter(None, found)) or "nothing"
-
-
-class _progress:
-    """A bar on stderr with frame rate and remaining time; silent when quiet or not on a terminal."""
-
-    def __init__(self, frames: int, quiet: bool):
-        self.frames, self.quiet = frames, quiet or not sys.stderr.isatty()
-
-    def __enter__(self) -> Callable[[], None]:
-        if self.quiet:
-            return lambda: None
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        self.bar = Progress(
-            TextColumn("frames"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]:.1f} frames/s"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-        )
-        task = self.bar.add_task("frames", total=self.frames, rate=0.0)
-        self.bar.start()
-        start = time.perf_counter()
-        done = 0
-
-        def advance() -> None:
-            nonlocal done
-            done += 1
-            self.bar.update(task, advance=1, rate=done / (time.perf_counter() - start))
-
-        return advance
-
-    def __exit__(self, *_) -> None:
-        if not self.quiet:
-            self.bar.stop()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wfluid.animation import Animation, Frame
+from wfluid.control.match import Match
 from wfluid.files import whole_file
 from wfluid.forces import Force, flat
 from wfluid.linear import Residual
@@ -24,6 +25,10 @@ class Report:
 
     animation: Animation
     """What is run."""
+    match: Match | None = None
+    """What the search for its keyframes came to."""
+    side: float = 1.0
+    """The longer side in the pixels that keyframes are given in."""
     frames: int = 0
     """Frames seen."""
     extremes: dict[str, float] = field(
@@ -93,6 +98,42 @@ class Report:
             }
         }
 
+    def _keyframes(self) -> dict[str, Any]:
+        """What the search for keyframes came to; a residual is the larger of the particle's and the map's."""
+        match, side = self.match, self.side
+        if match is None:
+            return {}
+        residuals = [arrival.residual * side for arrival in match.arrivals]
+        return {
+            "keyframes": [
+                {
+                    "from": [value * side for value in arrival.keyframe.point],
+                    "to": [value * side for value in arrival.keyframe.destination],
+                    "time": arrival.keyframe.time,
+                    "pinned": arrival.pinned,
+                    "residual_px": residual,
+                    "reason": arrival.reason,
+                }
+                for arrival, residual in zip(match.arrivals, residuals, strict=True)
+            ],
+            "residual_px": residuals,
+            "residual_max_px": max(residuals),
+            "tolerance_px": match.tolerance * side,
+            "status": match.status,
+            "iterations": match.iterations,
+            "evaluations": match.evaluations,
+            "history": [
+                {
+                    "stage": at.stage,
+                    "evaluations": at.evaluations,
+                    "objective": at.value,
+                    "worst_px": at.worst * side,
+                }
+                for at in match.history
+            ],
+            "search_seconds": match.seconds,
+        }
+
     def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
         """The report; `seconds` adds the times that the animation does not know."""
         animation, fluid = self.animation, self.animation.fluid
@@ -127,6 +168,7 @@ class Report:
             **self.extremes,
             "area": _area(self.extremes),
             **self._loop(),
+            **self._keyframes(),
             "solves": self.solves,
             "device": str(animation.solver.device.name),
             "versions": versions(),

@@ -172,6 +172,13 @@ class Scene:
         return found
 
     @property
+    def _last_keyframe(self) -> float | None:
+        """The latest time that keyframes name [s]; None if they name none."""
+        keyframes = self.tables.get("keyframes", {})
+        named = [table["time"] for table in (keyframes, *keyframes.get("move", [])) if "time" in table]
+        return max(named, default=None)
+
+    @property
     def timeline(self) -> Timeline:
         """When frames are shown.
 
@@ -179,8 +186,9 @@ class Scene:
             SceneError: a length or a rate that makes no sense.
         """
         time = self.tables.get("time", {})
+        duration = time.get("duration", self._last_keyframe or 2.0)
         try:
-            return Timeline(time.get("duration", 2.0), time.get("fps", 15.0), time.get("substeps"))
+            return Timeline(duration, time.get("fps", 15.0), time.get("substeps"))
         except ValueError as error:
             raise self.error(SchemaError(("time",), str(error))) from None
 

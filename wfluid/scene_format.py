@@ -220,11 +220,32 @@ _SOURCE = Table(
     },
 )
 
+_MOVE = Table(
+    "A point that should be somewhere; several of one point make a path",
+    {
+        "from": Key("its place in the untouched picture", **_POINT, unit="px", required=True),
+        "to": Key("where it should be", **_POINT, unit="px", required=True),
+        "time": Key("when", **number(above=0), unit="s", default="that of all"),
+        "weight": Key("how much it counts beside others", **number(above=0), default="1"),
+    },
+)
+
+_FOUND = Table(
+    "A force found before, as a saved scene has it: the search goes on from there",
+    {
+        "center": Key("where it acts", **_POINT, unit="px", required=True),
+        "vector": Key("acceleration at its centre", **_POINT, unit="px/s^2", required=True),
+        "radius": Key("sigma of its Gaussian", **number(above=0), unit="px", required=True),
+        "start": Key("when it begins", **number(0), unit="s", required=True),
+        "end": Key("when it ends", **number(above=0), unit="s", required=True),
+    },
+)
+
 SCENE = Table(
     "A scene",
     {
         "wfluid": Key("version of the format", _version, f"a whole number to {VERSION}", required=True),
-        "seed": Key("seed of noises that name none", **whole(0, 2**32 - 1), default="0"),
+        "seed": Key("of noises that name none, and of keyframes", **whole(0, 2**32 - 1), default="0"),
         "picture": Table(
             "What is animated",
             {
@@ -296,9 +317,15 @@ SCENE = Table(
         "time": Table(
             "When frames are shown",
             {
-                "duration": Key("length", **number(above=0), unit="s", default="2"),
+                "duration": Key(
+                    "length", **number(above=0), unit="s", default="that of the last keyframe, or 2"
+                ),
                 "fps": Key("frames a second", **number(LEAST_FPS, FPS_LIMIT), default="15"),
-                "substeps": Key("steps a frame", **whole(1, 100_000), default="steps of at most 1/96 s"),
+                "substeps": Key(
+                    "steps a frame",
+                    **whole(1, 100_000),
+                    default="steps of at most 1/96 s, with keyframes 1/48 s",
+                ),
                 "loop": Key("how the end meets the beginning", **word(*LOOPS), default="not at all"),
             },
         ),
@@ -361,7 +388,26 @@ SCENE = Table(
             "Points that are followed",
             {"points": Key("where they begin", **rows(2, 1, "a list of points, [[x, y], …]"), unit="px")},
         ),
-        "keyframes": Table("Where points arrive; not yet in this version, so without keys"),
+        "keyframes": Table(
+            "Where points arrive: forces are found that take them there",
+            {
+                "move": Many(_MOVE),
+                "points": _file("moves in a CSV file: from x, y, to x, y, perhaps time", kind="file"),
+                "time": Key("of moves that name none", **number(above=0), unit="s", default="the duration"),
+                "pins": Key(
+                    "points that stay in their place until the last keyframe",
+                    **rows(2, 1, "a list of points, [[x, y], …]"),
+                    unit="px",
+                ),
+                "tolerance": Key(
+                    "how far a point may end from its keyframe",
+                    **number(above=0),
+                    unit="px",
+                    default="a quarter, of a picture of 512",
+                ),
+                "force": Many(_FOUND),
+            },
+        ),
         "output": Many(
             Table(
                 "What is written",

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from wfluid import colour
 from wfluid.animation import Animation
+from wfluid.control.keyframes import TOLERANCE, Aims, ParticleKeyframe, particles_of
 from wfluid.courses import course
 from wfluid.density import Density, PaintedSource, Source
 from wfluid.drawing import Drawing
-from wfluid.envelopes import product
+from wfluid.envelopes import Constant, product
 from wfluid.fluid import Fluid
-from wfluid.forces import BlobForce, Force, Group, flat
+from wfluid.forces import BlobForce, Force, GaussianForce, Group, flat
 from wfluid.loops import check_loop
 from wfluid.paintings import SAME_ASPECT, Paintings
 from wfluid.picture import Picture, PictureError, read_picture
+from wfluid.point_file import read_points
 from wfluid.scene import Scene
 from wfluid.schema import SchemaError
+from wfluid.timeline import Timeline, substeps_for
+
+KEYFRAME_STEPS = 48
+"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
 
 
 def stage(
@@ -32,8 +40,21 @@ def stage(
         SceneError: a value that makes no sense, with its key and line.
         PictureError: a file that cannot be read.
     """
+    return stage_all(scene, device, note)[0]
+
+
+def stage_all(
+    scene: Scene, device: str | None = None, note: Callable[[str], None] = lambda text: None
+) -> tuple[Animation, Aims | None]:
+    """The animation that a scene describes, and what it wants of its points, if it has keyframes.
+
+    Raises:
+        SceneError: as `stage`.
+        PictureError: as `stage`.
+    """
     try:
-        return _Stage(scene, note).animation(device)
+        staged = _Stage(scene, note)
+        return staged.animation(device), staged.aims
     except SchemaError as error:
         raise scene.error(error) from error
 
@@ -50,6 +71,7 @@ class _Stage:
         self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
         self.paintings = Paintings(self.picture, scene.folder, note)
         self.drawing = self._drawing()
+        self.aims = _at(("keyframes",), self._aims) if "keyframes" in self.tables else None
 
     def animation(self, device: str | None) -> Animation:
         """All of it together."""
@@ -110,6 +132,52 @@ class _Stage:
             frozen=_at(("freeze",), lambda: self.paintings.freeze(tables.get("freeze"))),
             paintings=self.paintings,
         )
+
+    def _aims(self) -> Aims:
+        """The keyframes; every one on a step of the timeline, which is refined where that does it."""
+        table, drawing = self.tables["keyframes"], self.drawing
+        latest = table.get("time", self.timeline.duration)
+        moves = []
+        for n, move in enumerate(table.get("move", [])):
+            time, weight = move.get("time", latest), move.get("weight", 1.0)
+            moves.append((("keyframes", "move", n), move["from"], move["to"], time, weight))
+        if "points" in table:
+            for row in read_points(self.scene.folder / table["points"]):
+                time = latest if row.time is None else row.time
+                moves.append((("keyframes", "points"), row.source, row.target, time, 1.0))
+        timeline = self.timeline
+        if timeline.substeps is None:
+            substeps = substeps_for([move[3] for move in moves], timeline.fps, KEYFRAME_STEPS)
+            timeline = self.timeline = replace(timeline, substeps=substeps)
+        place = drawing.place
+
+        def keyframe(a: list[float], b: list[float], time: float, weight: float) -> ParticleKeyframe:
+            return ParticleKeyframe(place("from", a), place("to", b), self._on_step(time, timeline), weight)
+
+        keyframes = tuple(_at(path, partial(keyframe, *numbers)) for path, *numbers in moves)
+        side = drawing.side
+        aims = Aims(
+            keyframes,
+            tuple(place("a pin", pin) for pin in table.get("pins", [])),
+            tuple(_found(found, side) for found in table.get("force", [])),
+            table["tolerance"] / side if "tolerance" in table else TOLERANCE,
+            self.tables.get("seed", 0),
+            side,
+        )
+        extent = drawing.width / side, drawing.height / side
+        particles_of(aims.keyframes, aims.pins, extent, timeline.end, side)
+        if self.loop:
+            raise ValueError(f"a loop ({self.loop}) goes without keyframes: its end is its beginning")
+        return aims
+
+    def _on_step(self, time: float, timeline: Timeline) -> float:
+        """The time of the nearest step; said where that is another."""
+        step = max(1, round(time / timeline.dt))
+        near = timeline.time_of(step)
+        if abs(near - time) > 1e-6 * timeline.dt and time <= timeline.end:
+            self.note(f"a keyframe at {time:g} s is met at {near:.6g} s, when a step ends")
+            return near
+        return near if time <= timeline.end else time
 
     def _fluid(self, **more: Any) -> Fluid:
         fluid = self.tables.get("fluid", {})
@@ -192,6 +260,33 @@ class _Stage:
     def _points(self) -> list[tuple[float, float]]:
         points = self.tables.get("tracks", {}).get("points", [])
         return [_at(("tracks", "points"), lambda at=at: self.drawing.place("a point", at)) for at in points]
+
+
+def _found(table: Mapping[str, Any], side: float) -> GaussianForce:
+    """A force found before."""
+    (x, y), (a, b) = table["center"], table["vector"]
+    window = Constant(table["start"], table["end"])
+    return GaussianForce((x / side, y / side), (a / side, b / side), table["radius"] / side, window)
+
+
+def found_table(force: GaussianForce, side: float) -> dict[str, Any]:
+    """The table of a force that was found, whose window is constant; the inverse of how it is read."""
+    window: Constant = force.envelope
+    return {
+        "center": [value * side for value in force.center],
+        "vector": [value * side for value in force.vector],
+        "radius": force.radius * side,
+        "start": window.start,
+        "end": window.end,
+    }
+
+
+def with_found(scene: Scene, found: Sequence[GaussianForce], side: float) -> Scene:
+    """The scene with the forces that were found for its keyframes."""
+    keyframes = {**scene.tables["keyframes"], "force": [found_table(force, side) for force in found]}
+    return Scene(
+        {**scene.tables, "keyframes": keyframes}, scene.folder, scene.source, scene.lines, scene.flags
+    )
 
 
 def linear_color(text: str) -> tuple[float, float, float]:

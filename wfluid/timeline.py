@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wfluid.impulses import STEP_LIMIT
@@ -15,6 +16,22 @@ LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
 
 FRAME_LIMIT = 100_000
 """Most frames of one animation."""
+
+MOST_FACTOR = 8
+"""Times the least steps that may be taken so that a time falls on one."""
+
+
+def substeps_for(times: Sequence[float], fps: float, least: float) -> int:
+    """The fewest steps a frame, `least` a second or more, with which every time falls on a step.
+
+    Where 8 times as many do not do it either, the fewest there are.
+    """
+    fewest = math.ceil(least / fps - 1e-9)
+    for substeps in range(fewest, MOST_FACTOR * fewest + 1):
+        steps = [t * fps * substeps for t in times]
+        if all(abs(step - round(step)) < 1e-6 and round(step) > 0 for step in steps):
+            return substeps
+    return fewest
 
 
 @dataclass(frozen=True)

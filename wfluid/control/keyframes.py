@@ -9,7 +9,11 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from wfluid.forces import GaussianForce
 from wfluid.paths import Place
+
+TOLERANCE = 0.25 / 512
+"""Residual that is good enough [longer side]: a quarter of a pixel of a picture of 512."""
 
 COINCIDENT = 1e-6
 """Places nearer than this are one [longer side]."""
@@ -42,6 +46,24 @@ class ParticleKeyframe:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"ParticleKeyframe.{name} {value}: expected a positive number")
+
+
+@dataclass(frozen=True)
+class Aims:
+    """What a scene wants of its points."""
+
+    keyframes: tuple[ParticleKeyframe, ...]
+    """Where they should be, and when."""
+    pins: tuple[Place, ...]
+    """Those that stay [longer side]."""
+    found: tuple[GaussianForce, ...]
+    """Forces found before."""
+    tolerance: float
+    """Residual that is good enough [longer side]."""
+    seed: int
+    """Of the search."""
+    side: float
+    """The longer side, in the scene's pixels."""
 
 
 @dataclass(frozen=True, eq=False)

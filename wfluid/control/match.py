@@ -19,9 +19,9 @@ from itertools import pairwise
 import numpy as np
 
 from wfluid.animation import Animation
-from wfluid.control.keyframes import Particle, ParticleKeyframe, particles_of
+from wfluid.control.keyframes import TOLERANCE, Particle, ParticleKeyframe, particles_of
 from wfluid.control.plan import edges_of, forces_along, radii_of, ways_of
-from wfluid.control.search import COARSE, FINE, LED, Level, Log, Progress, Scene, Search, Span, Stopped
+from wfluid.control.search import COARSE, FINE, Level, Log, Progress, Scene, Search, Span, Stopped
 from wfluid.control.variables import Free
 from wfluid.coordinate_map import CoordinateMap, measure_map
 from wfluid.forces import Force, GaussianForce, flat
@@ -31,16 +31,13 @@ from wfluid.solver import Solver
 from wfluid.timeline import Timeline
 from wfluid.walls import Wall
 
-TOLERANCE = 0.25 / 512
-"""Residual that is good enough [longer side]: a quarter of a pixel of a picture of 512."""
-
 COARSE_CELLS, CELLS_A_RADIUS = 64, 2.0
 """Cells of the coarse grid along the longer side: so many, or more, so that the least radius has so many."""
 
-FACTORS = (1.0, 0.65)
+FACTORS = (1.0, 1.4, 0.65)
 """Factors on the radii of forces: wide ones deform least, narrow ones tell near points apart."""
 
-SPAN = 2.5
+SPAN = 0.5
 """Time between keyframes that is searched at once, if there are so many [s]."""
 
 FROZEN = 0.3
@@ -72,6 +69,14 @@ class Arrival:
         """The larger of the particle's distance to the destination and the source's to the point."""
         missed = math.dist(self.particle, self.keyframe.destination)
         return max(missed, math.dist(self.source, self.keyframe.point))
+
+    def said(self, side: float) -> str:
+        """It in a line, in pixels of a picture whose longer side is `side`."""
+        (x, y), (to_x, to_y) = self.keyframe.point, self.keyframe.destination
+        way = f"{x * side:g},{y * side:g}"
+        way = f"the pin {way}" if self.pinned else f"{way} to {to_x * side:g},{to_y * side:g}"
+        why = f": {self.reason}" if self.reason else ""
+        return f"{way} at {self.keyframe.time:g} s: {self.residual * side:.3g} px away{why}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,12 +155,14 @@ def match_keyframes(
     best: Match | None = None
     for factor in FACTORS if not (free or start) else FACTORS[:1]:
         matcher = _Matcher(animation, particles, free, tuple(start), tolerance, seed, factor, log)
+        if start and (best := _measured(matcher, False, log, began)).status == REACHED:
+            break  # they do it as they are
         try:
             matcher.run()
             stopped = False
         except Stopped:
             stopped = True
-        match = _measured(matcher, stopped, log, time.perf_counter() - began)
+        match = _measured(matcher, stopped, log, began)
         if best is None or _rank(match) < _rank(best):
             best = match
         if stopped or (best.status == REACHED and best.jacobian[0] > 0):
@@ -199,8 +206,12 @@ class _Matcher:
 
     @property
     def found(self) -> tuple[GaussianForce, ...]:
-        """The forces found so far, those to begin with where nothing is known yet."""
-        return tuple(force for search in self._searches for force in search.forces)
+        """The forces found so far; those to begin with where there is no search yet."""
+        return (
+            self._start
+            if not self._searches
+            else tuple(force for search in self._searches for force in search.forces)
+        )
 
     def run(self) -> None:
         """Search span after span.
@@ -239,10 +250,7 @@ class _Matcher:
         self._searches.append(search)
         try:
             if any(span.guided):
-                if not self._start:
-                    search.march(coarse)
-                search.settle(LED, coarse)
-                search.free()
+                search.march(coarse)
             if coarse.grid != fine.grid:
                 search.settle(COARSE, coarse)
             search.settle(FINE, fine)
@@ -254,7 +262,7 @@ class _Matcher:
 
     def _span(self, edges: list[int], level: Level, scene: Scene) -> Span:
         """The forces to begin with: those from before, and for points that these do not bring home."""
-        forces, windows, owners = list(self._start), [0] * len(self._start), []
+        forces, windows, owners = list(self._start), [-1] * len(self._start), []
         owners += range(len(self.ways), len(self.ways) + len(self._start))  # chains of their own
         guided = [not self._free] * len(self.ways)
         if self._start:
@@ -329,7 +337,7 @@ def _tracks(
     return np.stack(tracks), found, (least, greatest)
 
 
-def _measured(matcher: _Matcher, stopped: bool, log: Log, total: float) -> Match:
+def _measured(matcher: _Matcher, stopped: bool, log: Log, began: float) -> Match:
     """Run the animation and see where its points are."""
     animation, particles = matcher.animation, matcher.particles
     given, found = matcher.given, matcher.found
@@ -351,6 +359,7 @@ def _measured(matcher: _Matcher, stopped: bool, log: Log, total: float) -> Match
     reached = all(arrival.residual <= matcher.tolerance for arrival in arrivals)
     if not reached:
         arrivals = [replace(arrival, reason=_reason(arrival, arrivals, animation)) for arrival in arrivals]
+    total = time.perf_counter() - began
     seconds = {
         "simulation": log.seconds.forward,
         "adjoint": log.seconds.backward,

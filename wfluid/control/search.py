@@ -2,14 +2,14 @@
 
 Minimised is phi (`journey`) + weight (effort + smoothness). Effort is half the integral of |f|^2 over that
 of a typical force; smoothness is half the squares of the changes, from a force to the next of its point, of
-strength and place in units of what moves a point by a radius. The weight is lowered until the keyframes
-are met.
+strength and place in units of what moves a point by a radius. What that weighs keeps points a little from
+their keyframes; multipliers take them there, and where these are too slow the weight is lowered.
 
 On a coarse grid first. Window by window, each with a look at the next, forces are found that keep the points
 on their ways: a march can follow where one search over the whole time would have to aim through a flow that
-it does not know yet. Then all windows together, first still led by the ways, then free. Last on the grid
-asked for, where a few evaluations are enough. Long scenes are cut at keyframes into spans; each begins with
-the fluid that the one before has left.
+it does not know yet. Then all windows together, bound to the keyframes alone. Last on the grid asked for,
+where a few evaluations are enough. Longer scenes are cut at keyframes into spans; each begins with the fluid
+that the one before has left.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
 
 from wfluid.control.functional import Functional, Seconds
-from wfluid.control.journey import Journey
+from wfluid.control.journey import NOTHING, Journey
 from wfluid.control.lbfgs import Settings, minimise
 from wfluid.control.lbfgs import State as Iterate
 from wfluid.control.objectives import Effort
@@ -35,19 +34,25 @@ from wfluid.grid import Grid
 from wfluid.state import State
 from wfluid.timeline import Timeline
 
-WEIGHT, LOWER, LEAST_WEIGHT = 1e-3, 0.1, 1e-8
-"""Weight of effort and smoothness in the beginning, the factor that lowers it, and where that ends."""
-
-MARCH, LED, COARSE, FINE = "march", "led", "coarse", "fine"
+MARCH, COARSE, FINE = "march", "coarse", "fine"
 """Stages of a search."""
 
-EVALUATIONS = {MARCH: 25, LED: 15, COARSE: 60, FINE: 25}
-"""Most evaluations before the weight is lowered, or the stage ends; of a march in each window."""
+MARCH_WEIGHT, WEIGHT = 1e-3, 1e-4
+"""Weight of effort and smoothness: in the march, and then to begin with."""
 
-CHANGE = {MARCH: 1e-2, LED: 1e-2, COARSE: 1e-5, FINE: 1e-6}
-"""Relative decrease below which that is so too."""
+LOWER, LEAST_WEIGHT = 0.1, 1e-8
+"""The factor that lowers it, and where that ends."""
 
-NEAR = {MARCH: 0.0, LED: 0.5, COARSE: 0.5, FINE: 0.4}
+EVALUATIONS = {MARCH: 25, COARSE: 30, FINE: 15}
+"""Most evaluations of a minimisation; a march has one a window."""
+
+CHANGE = {MARCH: 1e-2, COARSE: 1e-3, FINE: 1e-3}
+"""Relative decrease at which it ends."""
+
+ROUNDS = {COARSE: 12, FINE: 8}
+"""Most minimisations of a stage."""
+
+NEAR = {MARCH: 0.0, COARSE: 0.5, FINE: 0.4}
 """Parts of the tolerance: misfits at which a stage ends."""
 
 NEAR_ENOUGH = 0.5
@@ -60,16 +65,12 @@ MEMORY = 20
 """Pairs that the optimiser keeps: little beside a run, and many of the few directions there are."""
 
 
-NOTHING: Mapping = MappingProxyType({})
-"""No shifts."""
-
-
 @dataclass(frozen=True)
 class Progress:
     """How far a search is."""
 
     stage: str
-    """"march", "led", "coarse" or "fine"."""
+    """"march", "coarse" or "fine"."""
     iteration: int
     """Iterations so far, of all stages."""
     evaluations: int
@@ -109,7 +110,7 @@ class Span:
     forces: Sequence[GaussianForce]
     """The forces to begin with, point by point, in the order of their windows."""
     windows: Sequence[int]
-    """The window of each."""
+    """The window of each; -1 for one that a march leaves alone."""
     owners: Sequence[int]
     """The point of each."""
     guided: Sequence[bool]
@@ -162,6 +163,7 @@ class Search:
         ]
         self._typical_effort = float(np.mean(typical)) if typical else 1.0
         self._weight = WEIGHT
+        self._lures: dict[float, np.ndarray] = {}
 
     given: tuple[Force, ...]
     """The user's forces."""
@@ -190,19 +192,22 @@ class Search:
     def settle(self, stage: str, level: Level, shifts: Mapping[float, np.ndarray] = NOTHING) -> float:
         """Minimise over all windows; the longest misfit of a keyframe [longer side].
 
-        The weight is lowered while keyframes are missed, and stays lowered. `shifts` move the aims of
-        keyframes by time, (n, 2) [longer side].
+        While keyframes are missed, what they are missed by is added to what is aimed at: the method of
+        multipliers (Nocedal & Wright, 17.3). Where that does not halve it the weight is lowered too. `shifts`
+        move the places of keyframes by time, (n, 2) [longer side].
         """
-        edges = self._span.edges
-        while True:
-            worst = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), shifts)
-            if stage == LED or worst <= NEAR_ENOUGH * self._tolerance or self._weight <= LEAST_WEIGHT:
-                return worst
-            self._weight *= LOWER
-
-    def free(self) -> None:
-        """Let the ways lead no more."""
-        self._weight *= LOWER
+        edges, before = self._span.edges, math.inf
+        for _ in range(ROUNDS[stage]):
+            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), shifts)
+            if worst <= NEAR_ENOUGH * self._tolerance:
+                break
+            lower = 1.0 if worst < 0.5 * before else LOWER
+            if self._weight * lower < LEAST_WEIGHT:
+                break
+            self._weight, before = self._weight * lower, worst
+            for t, by in left.items():
+                self._lures[t] = (self._lures.get(t, 0.0) - by) * lower
+        return worst
 
     def after(self, level: Level, step: int | None = None) -> Level:
         """The level at the end of the span, or at a step."""
@@ -257,15 +262,15 @@ class Search:
         steps: tuple[int, int],
         free: Sequence[Free],
         shifts: Mapping[float, np.ndarray] = NOTHING,
-    ) -> float:
-        """Minimise over what is free, keeping the best; the longest misfit of a keyframe."""
+    ) -> tuple[float, Mapping[float, np.ndarray]]:
+        """Minimise over what is free, keeping the best; the longest misfit, and all, of keyframes."""
         log, span = self._log, self._span
-        journey = Journey(span.ways, level.points, self._moments(*steps), self._unit, span.guided)
-        journey.guide = float(stage in (MARCH, LED))
-        for t, by in shifts.items():
-            journey.shift(t, by)
-        functional = self._functional(level, steps[1], journey, free, self._weight)
-        smooth = Smoothness(self._chains(functional), self._weight)
+        moments, marches = self._moments(*steps), stage == MARCH
+        guided = span.guided if marches else ()
+        lures, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
+        journey = Journey(span.ways, level.points, moments, self._unit, guided, shifts, lures)
+        functional = self._functional(level, steps[1], journey, free, weight)
+        smooth = Smoothness(self._chains(functional), weight)
         done, stopped, seen = log.evaluations, False, {}
 
         def evaluate(m: np.ndarray) -> tuple[float, np.ndarray]:
@@ -273,13 +278,15 @@ class Search:
                 value, gradient = functional.value_and_gradient(m)
             except ValueError as error:  # a force beyond the limit
                 raise FloatingPointError(str(error)) from error
-            seen[m.tobytes()] = journey.worst
+            seen[m.tobytes()] = journey.worst, dict(journey.left)
             return smooth.added(value, gradient, m)
 
         def heed(at: Iterate) -> bool:
             nonlocal stopped
             log.evaluations = done + at.evaluations
-            progress = Progress(stage, len(log.history) + 1, log.evaluations, at.value, seen[at.x.tobytes()])
+            progress = Progress(
+                stage, len(log.history) + 1, log.evaluations, at.value, seen[at.x.tobytes()][0]
+            )
             log.history.append(progress)
             stopped = bool(log.heed(progress))
             return stopped or progress.worst <= NEAR[stage] * self._tolerance
@@ -299,7 +306,7 @@ class Search:
         self.given, self.forces = forces[: len(self.given)], forces[len(self.given) :]
         if stopped:
             raise Stopped
-        return seen.get(minimum.x.tobytes(), math.inf)
+        return seen.get(minimum.x.tobytes(), (math.inf, {}))
 
     def _chains(self, functional: Functional) -> list[Chain]:
         """The entries of each point's forces that vary, in the order of their windows."""
