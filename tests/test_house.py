@@ -54,14 +54,26 @@ def test_imports_run_one_way():
 
 
 @pytest.mark.parametrize(
-    ("library", "home"), [("OpenImageIO", {"picture", "output", "preview", "report"}), ("av", {"movie"})]
+    ("library", "home"),
+    [
+        ("OpenImageIO", {"picture", "output", "preview", "report"}),
+        ("av", {"movie"}),
+        ("matplotlib", {"keyframe_plot"}),
+    ],
 )
 def test_heavy_libraries_are_imported_by_their_wrappers_only_and_late(library, home):
     for path in (ROOT / "wfluid").rglob("*.py"):
         tree = ast.parse(path.read_text())
-        names = {
-            alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names
-        }
-        assert library not in names or path.stem in home, f"{path.name} imports {library}"
-        at_top = {alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}
-        assert library not in at_top
+        assert library not in libraries(ast.walk(tree)) or path.stem in home, f"{path.name} imports {library}"
+        assert library not in libraries(tree.body)
+
+
+def libraries(nodes):
+    """What the import statements among some nodes import."""
+    names = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return {name.partition(".")[0] for name in names}
