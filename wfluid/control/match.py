@@ -143,6 +143,7 @@ def match_keyframes(
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise ValueError(f"tolerance {tolerance}: expected a positive number")
     grid, timeline = animation.grid, animation.timeline
+    keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
     particles = particles_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
     for t in sorted({t for particle in particles for t in particle.times}):
         _check_step(t, timeline)
@@ -167,10 +168,15 @@ def _rank(match: Match) -> tuple[bool, float]:
     return match.status != REACHED or match.jacobian[0] <= 0, match.residual
 
 
+def _snapped(t: float, timeline: Timeline) -> float:
+    """The very number at which a step ends, of a time that differs from it by rounding only."""
+    end = timeline.time_of(max(1, round(t / timeline.dt)))
+    return end if abs(end - t) <= 1e-6 * timeline.dt else t
+
+
 def _check_step(t: float, timeline: Timeline) -> None:
-    step = round(t / timeline.dt)
-    if step == 0 or abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt:
-        near = ", ".join(f"{timeline.time_of(max(1, int(t / timeline.dt) + n)):.6g}" for n in (0, 1))
+    if t != timeline.time_of(max(1, round(t / timeline.dt))):
+        near = ", ".join(f"{timeline.time_of(int(t / timeline.dt) + n):.6g}" for n in (0, 1))
         raise ValueError(f"a keyframe at {t:g} s falls between two steps, at {near} s")
 
 
