@@ -26,7 +26,7 @@ def inner(count=200, cells=2.0, seed=0):
 
 
 def smooth(walls):
-    """A displacement that keeps to walls as a flow's does: it slides along free-slip ones, without a slope."""
+    """A displacement that keeps to walls as a flow's does: along free-slip ones it has no slope."""
     along_x, along_y = (np.cos if wall is Wall.FREE_SLIP else np.sin for wall in (walls.x, walls.y))
 
     def displacement(x, y):
