@@ -395,6 +395,8 @@ def _reason(arrival: Arrival, arrivals: Sequence[Arrival], animation: Animation)
         [walled[n] and min(place[n], extent[n] - place[n]) < cell for n in (0, 1)]
         for place in (point, destination)
     )
+    if all(near):
+        return "it lies in a corner, which the fluid cannot leave"
     for n, wall in enumerate((fluid.walls.x, fluid.walls.y)):
         if wall is Wall.NO_SLIP and near[n]:
             return "it lies on a no-slip wall, where the picture stays"
@@ -402,8 +404,6 @@ def _reason(arrival: Arrival, arrivals: Sequence[Arrival], animation: Animation)
             return "it lies on a wall, along which the fluid can slide but not leave it"
         if far[n] and not near[n]:
             return "its destination lies on a wall, which nothing from within reaches"
-    if all(near):
-        return "it lies in a corner, which the fluid cannot leave"
     if fluid.freeze is not None and fluid.freeze.paint.on(grid)[_cell(point, grid)] > FROZEN:
         return "it lies where the picture is frozen"
     for other in arrivals:
