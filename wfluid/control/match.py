@@ -311,9 +311,10 @@ class _Matcher:
 
 
 def _slope(warp: CoordinateMap, place: np.ndarray) -> np.ndarray:
-    """The Jacobian of a map at a place, (2, 2): rows are components of the source."""
-    step = np.diag([warp.grid.hx, warp.grid.hy])
-    return ((warp.source_at(place + step) - warp.source_at(place - step)) / (2 * np.diag(step))[:, None]).T
+    """The Jacobian of a map at a place, (2, 2): rows are components of the source; one-sided at an edge."""
+    grid, step = warp.grid, np.diag([warp.grid.hx, warp.grid.hy])
+    ahead, behind = (np.clip(place + by, 0.0, (grid.width, grid.height)) for by in (step, -step))
+    return ((warp.source_at(ahead) - warp.source_at(behind)) / np.diag(ahead - behind)[:, None]).T
 
 
 def _tracks(
