@@ -79,6 +79,11 @@ def test_what_may_stand_beside_one_another_is_not_refused():
             [],
             "the points 0.3,0.4 and 0.5,0.6 have one destination, 0.7,0.2, at 1 s",
         ),
+        (
+            [(A, C, 0.5), (B, C, 0.5), (B, D, 1.0)],
+            [],
+            "the points 0.3,0.4 and 0.5,0.6 have one destination, 0.7,0.2, at 0.5 s",
+        ),
         ([((1.01, 0.4), B, 1.0)], [], "the point 1.01,0.4 lies outside the picture, 1 x 0.75"),
         ([(A, (0.5, 0.76), 1.0)], [], "the destination 0.5,0.76 lies outside the picture, 1 x 0.75"),
         ([(A, (-0.01, 0.5), 1.0)], [], "the destination -0.01,0.5 lies outside the picture, 1 x 0.75"),

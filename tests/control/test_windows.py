@@ -70,10 +70,12 @@ def cut(make, fluid, forces, **more):
     return first.state_after(first.start)
 
 
-@pytest.mark.parametrize("name", FLUIDS)
-def test_a_run_that_goes_on_from_a_cut_ends_as_the_whole_does(make, name):
+@pytest.mark.parametrize(
+    ("name", "early"), [*((name, PUSH) for name in FLUIDS), ("no-slip", GROWING), ("drag", GROWING)]
+)
+def test_a_run_that_goes_on_from_a_cut_ends_as_the_whole_does(make, name, early):
     """Velocity, map, pressure, densities to the bit; particles too, but for their places' change of unit."""
-    fluid, forces = FLUIDS[name], [PUSH, GROWING, *LATE]
+    fluid, forces = FLUIDS[name], [PUSH, early, *LATE]
     whole = make(fluid, ParticleMisfit(POINTS, WANTED, END), forces)
     expected = whole.state_after(whole.start)
     middle = cut(make, fluid, forces)
