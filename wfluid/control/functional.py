@@ -111,12 +111,14 @@ class Functional:
             raise ValueError("a run begins with a velocity or with a state, not with both")
         self._first, self._last = 0, timeline.steps
         if end is not None:
-            self._last = self._step_of(end)
+            self._last = self._step_of(end, "an end")
         if begin is not None:
             start, state = begin
             if state.grid != grid or len(state.rho) != len(fluid.densities):
                 raise ValueError("a run begins with a state of its own grid and densities")
-            self._first = self._step_of(start)
+            self._first = self._step_of(start, "a beginning")
+            if self._first == self._last:
+                raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
             begin = (self._first, state)
         stages = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
@@ -258,7 +260,7 @@ class Functional:
                 for key, slope in force.pull_back(start, end, bar).items():
                     gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
 
-    def _step_of(self, t: float) -> int:
+    def _step_of(self, t: float, what: str = "an objective") -> int:
         """How many steps of the run end up to a time.
 
         Raises:
@@ -267,12 +269,12 @@ class Functional:
         timeline = self.timeline
         start, end = (timeline.time_of(step) for step in (self._first, self._last))
         if not start < t <= end * (1 + 1e-9):
-            raise ValueError(f"an objective at {t:g} s: expected a time after {start:g} and up to {end:g} s")
+            raise ValueError(f"{what} at {t:g} s: expected a time after {start:g} and up to {end:g} s")
         step = round(t / timeline.dt)
         if abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt or step == self._first:
             before, after = (timeline.time_of(int(t / timeline.dt) + n) for n in (0, 1))
             raise ValueError(
-                f"an objective at {t:g} s falls between steps, at {before:.6g} s and {after:.6g} s: choose "
+                f"{what} at {t:g} s falls between steps, at {before:.6g} s and {after:.6g} s: choose "
                 "fps and substeps so that it falls on one"
             )
         return step - self._first

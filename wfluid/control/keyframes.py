@@ -112,7 +112,7 @@ def particles_of(
         _check_inside("the pin", pin, extent, side)
         if _known(pin, moved) in moved:
             raise ValueError(f"the point {_shown(pin, side)} is pinned and moved")
-    pins = list(dict.fromkeys(pins))
+    pins = [pin for n, pin in enumerate(pins) if all(math.dist(pin, one) >= COINCIDENT for one in pins[:n])]
     found = [_particle(point, own, side) for point, own in moved.items()]
     _refuse_meetings(found, pins, side)
     times = tuple(sorted({keyframe.time for keyframe in keyframes}))

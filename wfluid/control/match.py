@@ -148,6 +148,7 @@ def match_keyframes(
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise ValueError(f"tolerance {tolerance}: expected a positive number")
     grid, timeline = animation.grid, animation.timeline
+    keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
     particles = particles_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
     for t in sorted({t for particle in particles for t in particle.times}):
         _check_step(t, timeline)
@@ -174,10 +175,15 @@ def _rank(match: Match) -> tuple[bool, float]:
     return match.status != REACHED or match.jacobian[0] <= 0, match.residual
 
 
+def _snapped(t: float, timeline: Timeline) -> float:
+    """The very number at which a step ends, of a time that differs from it by rounding only."""
+    end = timeline.time_of(max(1, round(t / timeline.dt)))
+    return end if abs(end - t) <= 1e-6 * timeline.dt else t
+
+
 def _check_step(t: float, timeline: Timeline) -> None:
-    step = round(t / timeline.dt)
-    if step == 0 or abs(timeline.time_of(step) - t) > 1e-6 * timeline.dt:
-        near = ", ".join(f"{timeline.time_of(max(1, int(t / timeline.dt) + n)):.6g}" for n in (0, 1))
+    if t != timeline.time_of(max(1, round(t / timeline.dt))):
+        near = ", ".join(f"{timeline.time_of(int(t / timeline.dt) + n):.6g}" for n in (0, 1))
         raise ValueError(f"a keyframe at {t:g} s falls between two steps, at {near} s")
 
 
@@ -313,9 +319,10 @@ class _Matcher:
 
 
 def _slope(warp: CoordinateMap, place: np.ndarray) -> np.ndarray:
-    """The Jacobian of a map at a place, (2, 2): rows are components of the source."""
-    step = np.diag([warp.grid.hx, warp.grid.hy])
-    return ((warp.source_at(place + step) - warp.source_at(place - step)) / (2 * np.diag(step))[:, None]).T
+    """The Jacobian of a map at a place, (2, 2): rows are components of the source; one-sided at an edge."""
+    grid, step = warp.grid, np.diag([warp.grid.hx, warp.grid.hy])
+    ahead, behind = (np.clip(place + by, 0.0, (grid.width, grid.height)) for by in (step, -step))
+    return ((warp.source_at(ahead) - warp.source_at(behind)) / np.diag(ahead - behind)[:, None]).T
 
 
 def _tracks(
@@ -398,6 +405,8 @@ def _reason(arrival: Arrival, arrivals: Sequence[Arrival], animation: Animation)
         [walled[n] and min(place[n], extent[n] - place[n]) < cell for n in (0, 1)]
         for place in (point, destination)
     )
+    if all(near):
+        return "it lies in a corner, which the fluid cannot leave"
     for n, wall in enumerate((fluid.walls.x, fluid.walls.y)):
         if wall is Wall.NO_SLIP and near[n]:
             return "it lies on a no-slip wall, where the picture stays"
@@ -405,8 +414,6 @@ def _reason(arrival: Arrival, arrivals: Sequence[Arrival], animation: Animation)
             return "it lies on a wall, along which the fluid can slide but not leave it"
         if far[n] and not near[n]:
             return "its destination lies on a wall, which nothing from within reaches"
-    if all(near):
-        return "it lies in a corner, which the fluid cannot leave"
     if fluid.freeze is not None and fluid.freeze.paint.on(grid)[_cell(point, grid)] > FROZEN:
         return "it lies where the picture is frozen"
     for other in arrivals:
