@@ -20,7 +20,7 @@ import numpy as np
 
 from wfluid.animation import Animation, Frame
 from wfluid.control.match import Arrival, Match
-from wfluid.control.search import COARSE, FINE, LED, MARCH
+from wfluid.control.search import COARSE, FINE, MARCH
 from wfluid.files import whole_file
 from wfluid.output import check_folder
 from wfluid.paths import Place
@@ -46,7 +46,7 @@ _LEFT, _GAP, _RIGHT, _TOP, _BOTTOM = 0.55, 0.55, 0.7, 0.62, 0.95  # around them 
 
 _INK, _GREY, _MISFIT, _OBJECTIVE = "#1a1a1a", "#666666", "#0050c8", "#c05000"
 _ARROW, _TRACK, _REACHED, _PIN = "#ffb000", "#00b4ff", "#0050c8", "#ff2d78"
-_TINTS = {MARCH: "#e4e9f0", LED: "#f7e3b4", COARSE: "#e6dcf3", FINE: "#dff0e4"}
+_TINTS = {MARCH: "#e4e9f0", COARSE: "#e6dcf3", FINE: "#dff0e4"}
 
 _STYLE = {
     "font.family": "DejaVu Sans",

@@ -21,7 +21,7 @@ from wfluid.device import kernels_are_built, open_device
 from wfluid.estimate import check_memory, estimate
 from wfluid.files import readable_size
 from wfluid.interrupt import HeldInterrupt
-from wfluid.keyframe_plot import plot_match
+from wfluid.keyframe_plot import check_plot, plot_match
 from wfluid.output import check_folder, names, open_output
 from wfluid.picture import Picture, write_picture
 from wfluid.preview import draw_controls
@@ -75,8 +75,10 @@ def run_scene(scene: Scene, how: Run) -> int:
     tables = scene.tables
     if not any(tables.get(key) for key in ("force", "density", "keyframes")):
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
-    if how.plot and "keyframes" not in tables:
-        raise ValueError("--plot draws keyframes: the scene has none")
+    if how.plot:
+        if "keyframes" not in tables:
+            raise ValueError("--plot draws keyframes: the scene has none")
+        check_plot(how.plot)
     if not (scene.outputs or how.preview or how.save_scene or how.plot or how.dry_run):
         raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
     _check_names(scene, how)

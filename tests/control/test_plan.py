@@ -182,24 +182,23 @@ def journey_of(paths, moments, pins=(), **more):
     return Journey([Way(one, 0.0) for one in own], np.array([one.point for one in own]), moments, 0.1, **more)
 
 
-def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius():
-    """At keyframes by their weights; between them by the guide where led, by `HOLD` where pinned."""
+@pytest.mark.parametrize("led", [1.0, 0.0])
+def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius(led):
+    """At keyframes by their weights; between them by 1 where led, by `HOLD` where pinned."""
     paths, pin = [((0.3, 0.4), {0.5: (0.5, 0.3)}), ((0.3, 0.6), {1.0: (0.5, 0.6)})], (0.7, 0.7)
     off = np.array([(0.03, 0.04), (0.0, -0.02), (0.06, 0.08)])
     squares = np.sum((off / 0.1) ** 2, axis=1)
-    for guide in (1.0, 0.3, 0.0):
-        journey = journey_of(paths, (0.25, 0.5, 0.75, 1.0), [pin])
-        journey.guide = guide
-        ways = [Way(one, 0.0) for one in particles(*paths, pins=[pin])]
-        for t, weights in {
-            0.25: (guide, guide, HOLD),
-            0.5: (1.0, guide, 1.0),
-            0.75: (0.0, guide, HOLD),
-            1.0: (0.0, 1.0, 1.0),
-        }.items():
-            value, slope = journey.at(t, np.array([way.at(t) for way in ways]) + off)
-            assert value == pytest.approx(0.5 * np.dot(weights, squares), rel=1e-9)
-            np.testing.assert_allclose(slope, np.array(weights)[:, None] * off / 0.1**2, rtol=1e-9)
+    journey = journey_of(paths, (0.25, 0.5, 0.75, 1.0), [pin], guided=[bool(led)] * 3)
+    ways = [Way(one, 0.0) for one in particles(*paths, pins=[pin])]
+    for t, weights in {
+        0.25: (led, led, HOLD),
+        0.5: (1.0, led, 1.0),
+        0.75: (0.0, led, HOLD),
+        1.0: (0.0, 1.0, 1.0),
+    }.items():
+        value, slope = journey.at(t, np.array([way.at(t) for way in ways]) + off)
+        assert value == pytest.approx(0.5 * np.dot(weights, squares), rel=1e-9)
+        np.testing.assert_allclose(slope, np.array(weights)[:, None] * off / 0.1**2, rtol=1e-9)
     assert journey.worst == pytest.approx(0.1)  # of the pin, at its keyframes
 
 
@@ -211,13 +210,15 @@ def test_a_journey_leads_only_the_points_it_is_told_to():
     assert journey.at(1.0, np.zeros((2, 2)))[1].all()
 
 
-def test_a_journey_aims_beside_keyframes_that_are_shifted():
-    journey = journey_of([((0.3, 0.4), {1.0: (0.5, 0.3)})], (0.5, 1.0))
-    journey.shift(1.0, np.array([[0.01, -0.02]]))
-    journey.shift(1.0, np.array([[0.01, 0.0]]))
-    value, slope = journey.at(1.0, np.array([[0.52, 0.28]]))
-    assert value == pytest.approx(0, abs=1e-12) and np.abs(slope).max() < 1e-9
-    assert journey.at(1.0, np.array([[0.5, 0.3]]))[0] == pytest.approx(0.5 * 0.08)
+def test_a_journey_aims_beside_places_that_are_shifted_or_lured_from():
+    """A shift moves the place itself; a lure only what is aimed at, so that the misfit remains one."""
+    by = {1.0: np.array([[0.02, -0.02]])}
+    for kind, left in (("shifts", 0.0), ("lures", np.hypot(0.02, 0.02))):
+        journey = journey_of([((0.3, 0.4), {1.0: (0.5, 0.3)})], (0.5, 1.0), **{kind: by})
+        value, slope = journey.at(1.0, np.array([[0.52, 0.28]]))
+        assert value == pytest.approx(0, abs=1e-12) and np.abs(slope).max() < 1e-9
+        assert journey.worst == pytest.approx(left, abs=1e-12)
+        assert journey.at(1.0, np.array([[0.5, 0.3]]))[0] == pytest.approx(0.5 * 0.08)
 
 
 def test_smoothness_is_half_the_squares_of_changes_beside_what_is_expected():

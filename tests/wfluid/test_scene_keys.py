@@ -28,8 +28,9 @@ OUTPUT = "[[output]]"
 FORCE_NAMES = {
     (heading, name) for heading, name in KEYS if name == "name" and heading.startswith("[[force]]")
 }
-ELSEWHERE = {("at the top", "wfluid")} | FORCE_NAMES | {key for key in KEYS if key[0] == OUTPUT}
-"""Keys that do not change a staged animation: tests below are about them."""
+KEYFRAMES = {key for key in KEYS if "keyframes" in key[0]}
+ELSEWHERE = {("at the top", "wfluid")} | FORCE_NAMES | {key for key in KEYS if key[0] == OUTPUT} | KEYFRAMES
+"""Keys that do not change a staged animation: tests below, and of keyframe scenes, are about them."""
 
 SETTINGS = {(heading, name): table.keys[name] for heading, _, table in tables() for name in table.keys}
 

@@ -28,8 +28,8 @@ HOLD = 0.1
 class Journey(ParticleObjective):
     """Misfits of particles on their ways.
 
-    `points` are places at the beginning of the run. Between keyframes pins are held, and points may be led along
-    their ways.
+    `points` are places at the beginning of the run. Between keyframes pins are held, and points may be led
+    along their ways.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Journey(ParticleObjective):
         shifts: Mapping[float, np.ndarray] = NOTHING,
         lures: Mapping[float, np.ndarray] = NOTHING,
     ):
-        """`moments` are times of the run, those of keyframes among them; `guided` says who is led; nobody by default.
+        """`moments` are times of the run, those of keyframes among them; `guided` says who is led, if any.
 
         `shifts` are added to the places of a time, (n, 2) [longer side]; `lures` to what is aimed at there
         without being the place.

@@ -37,6 +37,9 @@ COARSE_CELLS, CELLS_A_RADIUS = 64, 2.0
 FACTORS = (1.0, 1.4, 0.65)
 """Factors on the radii of forces: wide ones deform least, narrow ones tell near points apart."""
 
+NEARLY_FOLDED = 0.1
+"""Det J below which other radii are tried."""
+
 SPAN = 0.5
 """Time between keyframes that is searched at once, if there are so many [s]."""
 
@@ -166,13 +169,14 @@ def match_keyframes(
         match = _measured(matcher, stopped, log, began)
         if best is None or _rank(match) < _rank(best):
             best = match
-        if stopped or (best.status == REACHED and best.jacobian[0] > 0):
+        if stopped or not _rank(best)[0]:
             break
     return replace(best, history=tuple(log.history), evaluations=log.evaluations)
 
 
 def _rank(match: Match) -> tuple[bool, float]:
-    return match.status != REACHED or match.jacobian[0] <= 0, match.residual
+    """What makes a match worse than others: not to reach, or nearly to fold; then its residual."""
+    return match.status != REACHED or match.jacobian[0] < NEARLY_FOLDED, match.residual
 
 
 def _snapped(t: float, timeline: Timeline) -> float:

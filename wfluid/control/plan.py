@@ -20,7 +20,7 @@ from wfluid.envelopes import Constant
 from wfluid.forces import GaussianForce
 from wfluid.timeline import Timeline
 
-BENDS = (0.1, 0.25, 0.4, 0.55, 0.7)
+BENDS = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7)
 """How far ways may bend, in parts of their length; the least that keeps them apart is taken."""
 
 APART = 0.75
