@@ -166,6 +166,15 @@ def test_a_half_is_looked_at_at_the_times_of_the_whole(make):
     assert values(POINTS, end=between) == whole
 
 
+def test_a_state_given_out_stays_as_it_is_when_the_run_is_done_again(make):
+    functional = make(FLUIDS["constant viscosity"], MAP, [PUSH])
+    state = functional.state_after(functional.start)
+    kept = fields(state)
+    functional.value(2 * functional.start)
+    for got, wanted in zip(fields(state), kept, strict=True):
+        np.testing.assert_array_equal(got, wanted)
+
+
 def refuses(message, build, *arguments, **more):
     """It raises ValueError with one line that contains the message."""
     with pytest.raises(ValueError, match=re.escape(message)) as caught:
