@@ -61,7 +61,7 @@ def make(device):
 
 
 def fields(state):
-    return [a.numpy() for a in state.fields]
+    return [a.numpy().copy() for a in state.fields]
 
 
 def cut(make, fluid, forces, **more):
