@@ -249,7 +249,7 @@ def test_a_search_tells_what_it_does(match_of):
     assert min(seconds.values()) > 0
 
 
-@pytest.mark.parametrize("after", [1, 9])
+@pytest.mark.parametrize("after", [1, 12, 17])
 def test_a_search_that_is_told_to_stop_keeps_its_best(device_name, after):
     """It ends at that iteration; what it returns is what its forces do when they are run again."""
     told = []
