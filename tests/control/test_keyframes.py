@@ -235,12 +235,12 @@ def test_a_long_scene_is_searched_span_by_span(match_of):
 def test_a_search_tells_what_it_does(match_of):
     """Iterations and evaluations are counted through all stages, which follow one another."""
     match = match_of("a smile")
-    order = ["march", "led", "coarse", "fine"]
+    order = ["march", "coarse", "fine"]
     assert [one.iteration for one in match.history] == list(range(1, match.iterations + 1))
     evaluations = [one.evaluations for one in match.history]
     assert evaluations == sorted(evaluations) and evaluations[-1] <= match.evaluations
     stages = [order.index(one.stage) for one in match.history]
-    assert stages == sorted(stages) and set(stages) >= {0, 1, 3}
+    assert stages == sorted(stages) and set(stages) >= {0, 2}
     assert SIDE * match.history[-1].worst <= GOOD
     seconds = match.seconds
     assert seconds["total"] == pytest.approx(

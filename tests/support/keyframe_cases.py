@@ -106,7 +106,7 @@ CASES = {
         arrows=[((0.37, 0.44), (0.63, 0.44)), ((0.63, 0.56), (0.37, 0.56))], cells=96
     ),
     "a swap": Case(arrows=[((0.41, 0.5), (0.59, 0.5)), ((0.59, 0.5), (0.41, 0.5))], cells=128),
-    "twenty at random": Case(arrows=scattered(20, 0.13, 7), cells=96),
+    "twenty at random": Case(arrows=scattered(20, 0.13, 7), cells=128),
     "a third of the picture": Case(arrows=[((0.3, 0.52), (0.3 + 1 / 3, 0.47))], cells=96),
     "pins around": Case(arrows=[((0.5, 0.5), (0.54, 0.47))], pins=around((0.5, 0.5), 0.12), duration=1.0),
     "a path, one pinned": Case(

@@ -21,7 +21,7 @@ SAME_TIME = 1e-9
 NOTHING: Mapping[float, np.ndarray] = MappingProxyType({})
 """No shifts."""
 
-HOLD = 0.1
+HOLD = 0.3
 """Weight of a pin's misfits between keyframes."""
 
 

@@ -136,7 +136,8 @@ def match_keyframes(
     way; or none, if something of the animation's own forces is `free` instead ("forces[0].vector").
     `pins` are points that should stay where they are until the last keyframe.
 
-    `start` are forces found before: points that they already bring home get no further ones. `seed`
+    `start` are forces found before: points that they already bring home get no further ones; where that
+    does not lead to all keyframes, the search begins anew. `seed`
     chooses on which side points pass one another. `progress` is told of every iteration; what it returns,
     if true, stops the search. Refusals speak of lengths in parts of `side`. The same input and seed give
     the same bits on a CPU.
@@ -157,9 +158,11 @@ def match_keyframes(
         _check_step(t, timeline)
     log = Log(progress)
     best: Match | None = None
-    for factor in FACTORS if not (free or start) else FACTORS[:1]:
-        matcher = _Matcher(animation, particles, free, tuple(start), tolerance, seed, factor, log)
-        if start and (best := _measured(matcher, False, log, began)).status == REACHED:
+    tries = [(FACTORS[0], tuple(start))] if free or start else []
+    tries += [] if free else [(factor, ()) for factor in FACTORS]
+    for factor, before in tries:
+        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log)
+        if before and (best := _measured(matcher, False, log, began)).status == REACHED:
             break  # they do it as they are
         try:
             matcher.run()
@@ -259,7 +262,7 @@ class _Matcher:
         search = Search(scene, span, self.tolerance, self._log)
         self._searches.append(search)
         try:
-            if any(span.guided):
+            if any(span.guided) and not self._start:
                 search.march(coarse)
             if coarse.grid != fine.grid:
                 search.settle(COARSE, coarse)
