@@ -271,6 +271,8 @@ def _draw_grid(axes: Axes, match: Match, frame: Frame) -> None:
         levels = np.arange(np.floor(values.min()), np.ceil(values.max()) + 1)
         if not periodic:  # the walls themselves are lines, of which contours would find crumbs
             levels = levels[(levels > 0.01) & (levels < LINES * extent[n] - 0.01)]
+        if not len(levels):
+            continue  # the picture is narrower than a line's distance
         x, y = (side * place for place in places)
         for colour, wide, alpha in ((_INK, 1.5, 0.35), ("white", 0.65, 1.0)):
             drawn = axes.contour(x, y, values, levels, colors=colour, linewidths=wide, alpha=alpha)
@@ -295,16 +297,10 @@ def _draw_history(axes: Axes, match: Match) -> None:
         for one in (axes, other):
             one.set(xticks=[], yticks=[])
         return
-    at = np.array([progress.iteration for progress in history])
+    at, allowed = np.array([progress.iteration for progress in history]), side * match.tolerance
     for one, name, values, level, colour in (
         (other, "objective", [progress.value for progress in history], np.nan, _OBJECTIVE),
-        (
-            axes,
-            "worst misfit",
-            [side * progress.worst for progress in history],
-            side * match.tolerance,
-            _MISFIT,
-        ),
+        (axes, "worst misfit", [side * progress.worst for progress in history], allowed, _MISFIT),
     ):
         values = np.array(values, dtype=float)
         values[~np.isfinite(values) | (values <= 0)] = np.nan  # no keyframe in the stage's time
@@ -313,9 +309,7 @@ def _draw_history(axes: Axes, match: Match) -> None:
         one.set_ylim(*_decades(np.append(values, level)))
         one.yaxis.set_minor_formatter(NullFormatter())
         one.tick_params(axis="y", which="both", colors=colour, length=2.5)
-    allowed = axes.axhline(
-        side * match.tolerance, color=_MISFIT, linewidth=0.9, linestyle=(0, (4, 3)), gid="tolerance"
-    )
+    line = axes.axhline(allowed, color=_MISFIT, linewidth=0.9, linestyle=(0, (4, 3)), gid="tolerance")
     axes.set(xlim=(at[0] - 0.5, at[-1] + 0.5))
     axes.xaxis.set_major_locator(MaxNLocator(7, integer=True))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -326,8 +320,8 @@ def _draw_history(axes: Axes, match: Match) -> None:
         own = [progress.iteration for progress in entries]
         tints[stage] = other.axvspan(own[0] - 0.5, own[-1] + 0.5, color=_TINTS[stage], linewidth=0, zorder=-1)
         tints[stage].set(gid=f"{stage}-{own[0]}", label=stage)
-    allowed.set_label("allowed")
-    _legend(axes, [*tints.values(), allowed], 0.52)
+    line.set_label("allowed")
+    _legend(axes, [*tints.values(), line], 0.52)
 
 
 def _decades(values: np.ndarray) -> tuple[float, float]:

@@ -178,6 +178,7 @@ def test_a_search_that_had_nothing_to_do_is_drawn(match, tmp_path):
     ]
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("width", "height", "channels"), [(12, 96, 1), (96, 12, 4), (2500, 40, 2)])
 def test_panels_fit_any_picture(match, width, height, channels):
     """Nothing overlaps or leaves the figure; large pictures are not carried along whole."""
@@ -197,6 +198,8 @@ def test_panels_fit_any_picture(match, width, height, channels):
     assert boxes[0].x1 < boxes[1].x0 and boxes[1].x1 < boxes[2].x0
     for box in boxes:
         assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+    for name, size in (("x", width), ("y", height)):
+        assert len(named(figure, f"lines-{name}-white")) == (size * LINES > max(width, height))
     for axes in figure.axes[:2]:
         (image,) = axes.get_images()
         assert max(image.get_array().shape) <= 1200

@@ -88,6 +88,7 @@ WRONG = {
     "1,2,3,4_0": "1: to y '4_0': expected a number",
     "x;y;u;v\n1;2;3,5;4": "2: u '3,5': expected a number",
     f"{HEADER}1,2,,4": "2: x_raccoon is missing",
+    '"x" , y ,"u" ,v\n1,2, ,4': "2: u is missing",
     "1,nan,3,4": "1: from y nan: expected a finite number",
     "1,2,3,-1e999": "1: to y -1e999: expected a finite number",
     "1,2,3,4,later": "1: time 'later': expected a number",
