@@ -43,17 +43,17 @@ PINS = ((235, 40), (60, 60), (392, 95))
 TOLERANCE = 0.25 / SIDE
 
 
-def matched(cells=256, seconds=1.0, device=None, progress=lambda at: None):
-    """The forces that move the cat's points along the arrows."""
+def matched(cells=256, seconds=1.0, arrows=tuple(ARROWS), device=None):
+    """The forces that move the cat's points along the arrows, or along some of them."""
     animation = Animation(
         read_picture(PICTURE), Fluid(viscosity=0.005), [], Timeline(seconds, 24, 2), cells, device=device
     )
     keyframes = [
         ParticleKeyframe((x / SIDE, y / SIDE), (to_x / SIDE, to_y / SIDE), seconds)
-        for (x, y), (to_x, to_y) in ARROWS.values()
+        for (x, y), (to_x, to_y) in map(ARROWS.get, arrows)
     ]
     pins = [(x / SIDE, y / SIDE) for x, y in PINS]
-    return match_keyframes(animation, keyframes, pins=pins, tolerance=TOLERANCE, progress=progress)
+    return match_keyframes(animation, keyframes, pins=pins, tolerance=TOLERANCE)
 
 
 def check(match):
@@ -66,7 +66,6 @@ def check(match):
         "evaluations": match.evaluations,
         "seconds": match.seconds["total"],
     }
-    assert len(match.arrivals) == len(ARROWS) + len(PINS)
     assert figures["residual_px"] <= 0.25, [arrival.said(SIDE) for arrival in match.arrivals]
     assert figures["jacobian_min"] > 0.5, figures
     return figures

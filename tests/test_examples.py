@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,25 @@ def test_the_sensitivity_check_holds(device):
     """Stiffening where the gradient says takes from the nose's way what it foretold, within 3 %."""
     figures = load("sensitivity").check(cells=48, device=device.alias)
     assert figures["lost_here"] > 0.2
+
+
+def test_the_keyframes_check_holds(device):
+    """Every arrow's point arrives to a quarter of a pixel, in the flow and in the picture."""
+    example = load("keyframes")
+    match = example.matched(96, 0.5, ("left eye", "nose"), device=device.alias)
+    print(example.check(match))
+    moved = replace(match.arrivals[0], source=(0.5, 0.5))
+    with pytest.raises(AssertionError):
+        example.check(replace(match, arrivals=(moved, *match.arrivals[1:])))
+
+
+def test_the_keyframe_paths_check_holds(device):
+    """The nose is at every place of its circle in time; fewer places, or a nose beside one, fail."""
+    example = load("keyframe_path")
+    match = example.matched(cells=64, width=64, stops=2, device=device.alias)
+    print(example.check(match, stops=2))
+    with pytest.raises(AssertionError):
+        example.check(match)
 
 
 def test_every_scene_shows_its_control(device):

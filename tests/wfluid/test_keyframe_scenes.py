@@ -20,7 +20,7 @@ from wfluid.timeline import substeps_for
 
 MOVE = {"from": [20, 20], "to": [26, 16]}
 FOUND = {"center": [21, 19], "vector": [90, -60], "radius": 6, "start": 0, "end": 0.25}
-QUICK = ("--cells", "32", "--time", "0.25", "--fps", "12", "--quiet")
+QUICK = ("--cells", "16", "--time", "0.25", "--fps", "12", "--quiet")
 
 
 @pytest.fixture
