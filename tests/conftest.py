@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-import tempfile
+import threading
 from pathlib import Path
 
 import pytest
@@ -23,49 +23,72 @@ def pytest_addoption(parser):
 def pytest_collection_modifyitems(config, items):
     """Tests marked float64 run in a process of their own: precision is chosen once a process.
 
-    It begins with the others and runs beside them; the test that tells how it went comes last.
+    So do those marked beside, which take long, where the whole suite runs. Their processes run one
+    after the other beside this one; the tests that tell how they went come last.
     """
-    wanted = [item for item in items if (item.get_closest_marker("float64") is not None) == DOUBLE]
+    telling = any("apart" in item.fixturenames for item in items)
+    double = [item for item in items if item.get_closest_marker("float64")]
+    beside = [item for item in items if item.get_closest_marker("beside") and item not in double]
+    if DOUBLE:
+        wanted = double
+    elif os.environ.get("WFLUID_BESIDE"):
+        wanted = beside
+    else:
+        elsewhere = {*double, *(beside if telling else ())}
+        wanted = [item for item in items if item not in elsewhere]
     config.hook.pytest_deselected(items=[item for item in items if item not in wanted])
-    items[:] = sorted(wanted, key=lambda item: "double_precision" in item.fixturenames)
-    if items and "double_precision" in items[-1].fixturenames and not config.option.collectonly:
-        config.stash[DOUBLE_PRECISION] = DoublePrecision(config.getoption("--device"))
+    items[:] = sorted(wanted, key=lambda item: "apart" in item.fixturenames)
+    if items and "apart" in items[-1].fixturenames and not config.option.collectonly:
+        device = config.getoption("--device")
+        environments = {"float64": {"WFLUID_PRECISION": "float64"}, "beside": {"WFLUID_BESIDE": "1"}}
+        config.stash[APART] = Apart(environments, device)
 
 
-class DoublePrecision:
-    """Everything marked float64, running in a process beside this one."""
+class Apart:
+    """Everything under some marks, running beside this process: a process a mark, one after the other."""
 
-    def __init__(self, device):
-        command = [sys.executable, "-m", "pytest", "-m", "float64", str(Path(__file__).parent)]
-        command += ["--device", device, "-p", "no:cacheprovider"]
-        environment = dict(os.environ, WFLUID_PRECISION="float64")
-        self._said = tempfile.TemporaryFile("w+")
-        self._process = subprocess.Popen(command, env=environment, stdout=self._said, stderr=self._said)
+    def __init__(self, environments, device):
+        """`environments` are what each mark's process has beside this one's variables."""
+        self._environments, self._device = environments, device
+        self._ended = {mark: threading.Event() for mark in environments}
+        self._results, self._process, self._stopped = {}, None, False
+        threading.Thread(target=self._run, daemon=True).start()
 
-    def result(self):
-        """Exit code and output, once it has ended."""
-        code = self._process.wait(timeout=900)
-        self._said.seek(0)
-        return code, self._said.read()
+    def _run(self):
+        for mark, environment in self._environments.items():
+            command = [sys.executable, "-m", "pytest", "-m", mark, str(Path(__file__).parent)]
+            command += ["--device", self._device, "-p", "no:cacheprovider"]
+            if not self._stopped:
+                settings = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+                self._process = subprocess.Popen(command, env={**os.environ, **environment}, **settings)
+                said = self._process.communicate()[0]
+                self._results[mark] = self._process.returncode, said
+            self._ended[mark].set()
+
+    def result(self, mark):
+        """Exit code and output of a mark's process, once it has ended."""
+        assert self._ended[mark].wait(timeout=900)
+        return self._results[mark]
 
     def stop(self):
         """End it, if the others were stopped."""
-        self._process.kill()
-        self._process.wait()
+        self._stopped = True
+        if self._process:
+            self._process.kill()
 
 
-DOUBLE_PRECISION = pytest.StashKey[DoublePrecision]()
+APART = pytest.StashKey[Apart]()
 
 
 def pytest_unconfigure(config):
-    if DOUBLE_PRECISION in config.stash:
-        config.stash[DOUBLE_PRECISION].stop()
+    if APART in config.stash:
+        config.stash[APART].stop()
 
 
 @pytest.fixture
-def double_precision(request):
-    """The process that runs what is marked float64."""
-    return request.config.stash[DOUBLE_PRECISION]
+def apart(request):
+    """What runs in processes beside this one."""
+    return request.config.stash[APART]
 
 
 @pytest.fixture(scope="session")

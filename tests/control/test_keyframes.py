@@ -19,6 +19,8 @@ from wfluid import Freeze, Grid, Picture, Solver
 from wfluid.control.match import REACHED, STOPPED, TOLERANCE, UNREACHABLE
 from wfluid.device import open_device
 
+pytestmark = pytest.mark.beside
+
 GOOD = 0.25
 """Residual that is good enough [px]."""
 

@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -14,9 +12,12 @@ from scenes import KEYS, write_pictures
 from wfluid.cli import main
 from wfluid.control.keyframes import TOLERANCE
 from wfluid.picture import read_picture
+from wfluid.progress import SearchProgress
 from wfluid.scene import Scene, SceneError, read_scene, write_scene
 from wfluid.staging import stage_all
 from wfluid.timeline import substeps_for
+
+pytestmark = pytest.mark.beside
 
 MOVE = {"from": [20, 20], "to": [26, 16]}
 FOUND = {"center": [21, 19], "vector": [90, -60], "radius": 6, "start": 0, "end": 0.25}
@@ -223,15 +224,19 @@ def test_the_preview_shows_arrows_and_pins(folder):
     assert len(changed) and np.abs(changed - (35, 30)).max() <= 3
 
 
-def test_an_interrupt_ends_the_search_with_the_best_so_far(folder):
+def test_an_interrupt_ends_the_search_with_the_best_so_far(folder, capsys, monkeypatch):
     """Ctrl-C in the middle: the frames are written whole, how far each point is is said, exit code 130."""
-    moves = [f"--move={x},{y}:{x + 5},{y + 4}" for x in (8, 22, 36, 50) for y in (8, 20, 32)]
-    command = [sys.executable, "-m", "wfluid", "keyframes", "small.png", "-o", "a.gif", *moves]
-    command += ["--cells", "128", "--fps", "12", "--tolerance", "1e-9"]
-    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder, env=os.environ)
-    time.sleep(9)
-    run.send_signal(signal.SIGINT)
-    said = run.communicate(timeout=120)[1]
-    assert run.returncode == 130, said
-    assert "stopped: the farthest point is" in said and "Traceback" not in said
-    assert (folder / "a.gif").exists()
+
+    def press(self, at):
+        seen.append(at)
+        if len(seen) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)  # the handler runs
+
+    seen = []
+    monkeypatch.setattr(SearchProgress, "_show", press)
+    moves = ("--move", "8,8:13,12", "--move", "50,20:44,23")
+    assert main(["keyframes", "small.png", "-o", "a.gif", *moves, *QUICK]) == 130
+    said = capsys.readouterr().err
+    assert "stopped: the farthest point is" in said and "8,8 to 13,12 at 0.25 s: " in said
+    assert (folder / "a.gif").exists() and len(seen) == 3

@@ -137,10 +137,9 @@ def match_keyframes(
     `pins` are points that should stay where they are until the last keyframe.
 
     `start` are forces found before: points that they already bring home get no further ones; where that
-    does not lead to all keyframes, the search begins anew. `seed`
-    chooses on which side points pass one another. `progress` is told of every iteration; what it returns,
-    if true, stops the search. Refusals speak of lengths in parts of `side`. The same input and seed give
-    the same bits on a CPU.
+    does not lead to all keyframes, the search begins anew. `seed` chooses on which side points pass one
+    another. `progress` is told of every iteration; what it returns, if true, stops the search. Refusals
+    speak of lengths in parts of `side`. The same input and seed give the same bits on a CPU.
 
     Raises:
         ValueError: keyframes that contradict, see `particles_of`; one that falls between two steps; an
@@ -172,7 +171,8 @@ def match_keyframes(
         match = _measured(matcher, stopped, log, began)
         if best is None or _rank(match) < _rank(best):
             best = match
-        if stopped or not _rank(best)[0]:
+        failed = [arrival for arrival in best.arrivals if arrival.residual > tolerance]
+        if stopped or not _rank(best)[0] or (failed and all(arrival.reason for arrival in failed)):
             break
     return replace(best, history=tuple(log.history), evaluations=log.evaluations)
 
@@ -220,11 +220,9 @@ class _Matcher:
     @property
     def found(self) -> tuple[GaussianForce, ...]:
         """The forces found so far; those to begin with where there is no search yet."""
-        return (
-            self._start
-            if not self._searches
-            else tuple(force for search in self._searches for force in search.forces)
-        )
+        if not self._searches:
+            return self._start
+        return tuple(force for search in self._searches for force in search.forces)
 
     def run(self) -> None:
         """Search span after span.
