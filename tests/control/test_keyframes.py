@@ -16,7 +16,9 @@ from viscous_media import disc
 import wfluid.control.match
 import wfluid.control.search
 from wfluid import Freeze, Grid, Picture, Solver
+from wfluid.control.keyframes import particles_of
 from wfluid.control.match import REACHED, STOPPED, TOLERANCE, UNREACHABLE
+from wfluid.control.plan import ways_of
 from wfluid.device import open_device
 
 pytestmark = pytest.mark.beside
@@ -83,6 +85,18 @@ def test_arrivals_are_those_of_the_animation_run_again(match_of, name):
     extremes = [(frame.quality.jacobian_min, frame.quality.jacobian_max) for frame in frames]
     assert match.jacobian[0] == min(least for least, _ in extremes)
     assert match.jacobian[1] == max(greatest for _, greatest in extremes)
+
+
+@pytest.mark.parametrize("name", ["one arrow", "a smile", "opposite, side by side", "a swap", "periodic"])
+def test_points_are_on_their_ways_all_the_time(match_of, name):
+    """They set out at once and do not rush at the end: never far from where the plan has them."""
+    match = match_of(name)
+    timeline, grid = match.animation.timeline, match.animation.grid
+    particles = particles_of(CASES[name].keyframes, (), (grid.width, grid.height), timeline.end)
+    for n, way in enumerate(ways_of(particles, (grid.width, grid.height), 0)):
+        times = np.array([timeline.time_of(step) for step in range(timeline.steps + 1)])
+        aside = np.linalg.norm(match.tracks[:, n] - way.at(times), axis=1)
+        assert aside.max() < 0.04 * way.length(0.0, timeline.end), aside.max()
 
 
 def dots(places, height, spread=1.5):
@@ -314,7 +328,9 @@ HOPELESS = {
 def briefly(monkeypatch):
     """Let a search without hope end soon: with the first weight, with wide forces, after few evaluations."""
     monkeypatch.setattr(wfluid.control.search, "LEAST_WEIGHT", wfluid.control.search.WEIGHT)
-    monkeypatch.setattr(wfluid.control.search, "EVALUATIONS", dict.fromkeys(wfluid.control.search.NEAR, 8))
+    monkeypatch.setattr(
+        wfluid.control.search, "EVALUATIONS", dict.fromkeys(wfluid.control.search.EVALUATIONS, 8)
+    )
     monkeypatch.setattr(wfluid.control.match, "FACTORS", wfluid.control.match.FACTORS[:1])
 
 

@@ -175,6 +175,88 @@ def test_a_state_given_out_stays_as_it_is_when_the_run_is_done_again(make):
         np.testing.assert_array_equal(got, wanted)
 
 
+STRETCHES = {
+    "all of it": {},
+    "the first half": {"end": MIDDLE},
+    "a piece": {"begin": 2 / 48, "end": 7 / 48},
+    "the second half": {"begin": MIDDLE},
+}
+
+
+@pytest.mark.parametrize("name", FLUIDS)
+@pytest.mark.parametrize("weight", [0.0, 1e-3])
+def test_a_functional_with_the_graphs_of_another_computes_the_same(device, name, weight):
+    """Value and gradient to the bit, over stretch after stretch, with other numbers and other ones free."""
+    fluid, forces = Fluid(**FLUIDS[name]), [PUSH, *LATE]
+    last, sure = None, False
+    for n, (words, stretch) in enumerate(STRETCHES.items()):
+        stretch, points = dict(stretch), POINTS
+        if "begin" in stretch:
+            t = stretch["begin"]
+            before = Functional(GRID, fluid, forces, TIMELINE, misfit(points, t), [FREE], end=t)
+            state = before.state_after(before.start)
+            stretch["begin"], points = (t, state), state.points
+        objective = misfit(points, stretch.get("end", END))
+        objective = (1 + n) * objective + (weight / (1 + n)) * Effort() if weight else objective
+        forces = [replace(PUSH, vector=(9.0 - n, 5.0)), *LATE]
+        free = [FREE, Free("forces[1].center")][: 1 + n % 2]
+        one, other = (
+            Functional(GRID, fluid, forces, TIMELINE, objective, free, device=str(device), **stretch, **more)
+            for more in ({}, {"like": last, "room": END})
+        )
+        for _ in range(2):
+            (expected, slopes), (got, found) = (each.value_and_gradient(each.start) for each in (one, other))
+            assert got == expected, words
+            np.testing.assert_array_equal(found, slopes)
+        assert np.any(slopes)
+        sure = sure or (last is not None and other._recording is last._recording)
+        last = other
+    assert sure  # they were taken over
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fluid": Fluid(viscosity=0.02)},
+        {"forces": [PUSH]},
+        {"forces": [PUSH, *LATE, GROWING]},
+        {"objective": MAP},
+        {"objective": ParticleMisfit(POINTS[:1], WANTED[:1], END)},
+        {"objective": ParticleMisfit(POINTS, WANTED, END) + Effort()},
+        {"end": END, "of": {"end": MIDDLE}},
+        {"memory_mb": 1.0},
+        {"grid": replace(GRID, nx=24)},
+        {"timeline": replace(TIMELINE, substeps=2 * TIMELINE.steps_per_frame)},
+    ],
+    ids=lambda change: ", ".join(change),
+)
+def test_graphs_that_do_not_suit_are_not_taken_over(device, change):
+    change = dict(change)
+    usual = {
+        "grid": GRID,
+        "fluid": Fluid(viscosity=0.01),
+        "forces": [PUSH, *LATE],
+        "timeline": TIMELINE,
+        "objective": ParticleMisfit(POINTS, WANTED, END),
+        "free": [FREE],
+        "device": str(device),
+    }
+    of = change.pop("of", {})
+    objective = misfit(POINTS, of.get("end", END))
+    first = Functional(**usual | {"objective": objective} | of)
+    first.value(first.start)
+    second, expected = Functional(**usual | change, like=first), Functional(**usual | change)
+    assert second._recording is not first._recording
+    assert second.value(second.start) == expected.value(expected.start)
+
+
+FREE = Free("forces[0].vector")
+
+
+def misfit(points, time):
+    return ParticleMisfit(points, WANTED, time)
+
+
 def refuses(message, build, *arguments, **more):
     """It raises ValueError with one line that contains the message."""
     with pytest.raises(ValueError, match=re.escape(message)) as caught:

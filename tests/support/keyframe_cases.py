@@ -113,6 +113,9 @@ CASES = {
         paths=[((0.4, 0.45), {0.25: (0.46, 0.4), 0.5: (0.53, 0.43)})], pins=[(0.66, 0.6)]
     ),
     "a stiff disc": Case(arrows=[((0.42, 0.5), (0.48, 0.46))], fluid={"viscosity": honey(50)}),
+    "a stiff disc that moves": Case(
+        arrows=[((0.42, 0.5), (0.48, 0.46))], fluid={"viscosity": honey(50), "viscosity_moves": True}
+    ),
     "no-slip": Case(arrows=PAIR, fluid={"walls": "no-slip"}),
     "periodic": Case(arrows=PAIR, fluid={"walls": "periodic"}),
     "periodic and no-slip": Case(arrows=PAIR, fluid={"walls": "periodic,no-slip"}),

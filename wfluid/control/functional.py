@@ -32,7 +32,7 @@ from wfluid.control.objectives import (
     terms_of,
     times_of,
 )
-from wfluid.control.recording import Recording, Reversed
+from wfluid.control.recording import Recording, Reversed, Stretch
 from wfluid.control.variables import VELOCITY, VISCOSITY, Free, Setup, Variables
 from wfluid.density import Source
 from wfluid.device import open_device
@@ -85,6 +85,8 @@ class Functional:
         end: float | None = None,
         memory_mb: float | None = None,
         device: str | None = None,
+        like: Functional | None = None,
+        room: float = 0.0,
     ):
         """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
 
@@ -93,6 +95,10 @@ class Functional:
 
         `memory_mb` caps what the states of the run take, by far the most of its memory; with less room most
         steps are computed twice.
+
+        With `like`, its captured graphs are taken over where they suit: those of a functional of the same
+        grid and timeline, the very same fluid, as many forces and particles, effort or none. It is of no use
+        afterwards. One with `room` [s] suits stretches of time so long.
         """
         shape = (2, grid.ny, grid.nx)
         velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
@@ -109,40 +115,49 @@ class Functional:
             raise ValueError(f"memory_mb {memory_mb}: expected a positive number of megabytes")
         if begin is not None and velocity.any():
             raise ValueError("a run begins with a velocity or with a state, not with both")
-        self._first, self._last = 0, timeline.steps
+        self._first, self._last, begun = 0, timeline.steps, None
         if end is not None:
             self._last = self._step_of(end, "an end")
         if begin is not None:
-            start, state = begin
-            if state.grid != grid or len(state.rho) != len(fluid.densities):
+            start, begun = begin
+            if begun.grid != grid or len(begun.rho) != len(fluid.densities):
                 raise ValueError("a run begins with a state of its own grid and densities")
             self._first = self._step_of(start, "a beginning")
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
-            begin = (self._first, state)
-        stages = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE)
+        before = like._recording if like else None
+        if before and (before.stages.grid, before.timeline) == (grid, timeline):
+            stages = before.stages
+        else:
+            stages, before = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE), None
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[Term]] = {}
-        effort, begun = 0.0, 0
+        # graphs count effort with weight 1, and so suit all weights: the others are relative to it
+        self._scale = sum(weight for weight, term in terms_of(objective) if isinstance(term, Effort))
+        effort, self._scale, count = bool(self._scale), self._scale or 1.0, 0
         for weight, term in terms_of(objective):
-            own = slice(begun, begun + len(particles_of(term)))
-            begun = own.stop
+            own = slice(count, count + len(particles_of(term)))
+            count, weight = own.stop, weight / self._scale
             steps = [self._step_of(t) for t in times_of(term)]
             if isinstance(term, ParticleObjective):
                 self._particles.append((weight, term, own))
             elif isinstance(term, StateObjective):
                 terms.setdefault(steps[0], []).append(term.term(stages, weight, own))
-            elif isinstance(term, Effort):
-                effort += weight
-            else:
+            elif not isinstance(term, Effort):
                 raise TypeError(f"{type(term).__name__} is no objective that a run has")
         points = np.concatenate([np.empty((0, 2)), *(particles_of(term) for _, term in terms_of(objective))])
         if not np.all((points >= 0) & (points <= (grid.width, grid.height))):
             raise ValueError("an objective's particles must begin within the picture")
         self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
-        self._recording = Recording(
-            stages, setup, timeline, points, terms, memory_mb, of_viscosity, effort, begin, self._last
-        )
+        stretch = Stretch(self._first, self._last, begun, points)
+        if before and not (terms or of_viscosity or memory_mb) and before.suits(setup, stretch, effort):
+            before.moved(setup, stretch)
+            self._recording = before
+        else:
+            steps = round(room / timeline.dt)
+            self._recording = Recording(
+                stages, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
+            )
         self.evaluations, self.seconds = 0, Seconds()
 
     start: np.ndarray
@@ -194,7 +209,8 @@ class Functional:
         value, pulls = self._forward(m)
         began = time.perf_counter()
         found = self._recording.backward(pulls)
-        gradient = self.variables.pull_back(self._gradients(found), np.asarray(m, dtype=np.float64))
+        m = np.asarray(m, dtype=np.float64)
+        gradient = self._scale * self.variables.pull_back(self._gradients(found), m)
         if not np.all(np.isfinite(gradient)):
             self._recording.forward()  # a run with little memory has lost its end on the way back
             self._recording.backward(pulls, watch=self._refuse)
@@ -227,7 +243,7 @@ class Functional:
                 "smaller forces or steps help"
             )
         self.seconds.forward += time.perf_counter() - began
-        return value, pulls
+        return value * self._scale, pulls
 
     def _refuse(self, step: int, bar: State) -> None:
         if not all(np.all(np.isfinite(a.numpy())) for a in bar.arrays):

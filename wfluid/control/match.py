@@ -19,11 +19,14 @@ from itertools import pairwise
 import numpy as np
 
 from wfluid.animation import Animation
+from wfluid.control.functional import Functional
 from wfluid.control.keyframes import TOLERANCE, Particle, ParticleKeyframe, particles_of
 from wfluid.control.plan import edges_of, forces_along, radii_of, ways_of
 from wfluid.control.search import COARSE, FINE, Level, Log, Progress, Scene, Search, Span, Stopped
 from wfluid.control.variables import Free
 from wfluid.coordinate_map import CoordinateMap, measure_map
+from wfluid.diffusion import SURE_TOLERANCE
+from wfluid.fluid import Fluid
 from wfluid.forces import Force, GaussianForce, flat
 from wfluid.grid import Grid
 from wfluid.paths import Place
@@ -129,6 +132,7 @@ def match_keyframes(
     seed: int = 0,
     progress: Callable[[Progress], object] = lambda progress: None,
     side: float = 1.0,
+    factors: Sequence[float] | None = None,
 ) -> Match:
     """The forces that take points of an animation's picture to their keyframes.
 
@@ -139,7 +143,8 @@ def match_keyframes(
     `start` are forces found before: points that they already bring home get no further ones; where that
     does not lead to all keyframes, the search begins anew. `seed` chooses on which side points pass one
     another. `progress` is told of every iteration; what it returns, if true, stops the search. Refusals
-    speak of lengths in parts of `side`. The same input and seed give the same bits on a CPU.
+    speak of lengths in parts of `side`. `factors` on the radii of forces are tried in turn (`FACTORS`). The
+    same input and seed give the same bits on a CPU.
 
     Raises:
         ValueError: keyframes that contradict, see `particles_of`; one that falls between two steps; an
@@ -150,6 +155,7 @@ def match_keyframes(
         raise ValueError(f"a loop ({animation.loop}) goes without keyframes: its end is its beginning")
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise ValueError(f"tolerance {tolerance}: expected a positive number")
+    animation = replace(animation, fluid=_solved_surely(animation.fluid))
     grid, timeline = animation.grid, animation.timeline
     keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
     particles = particles_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
@@ -157,10 +163,12 @@ def match_keyframes(
         _check_step(t, timeline)
     log = Log(progress)
     best: Match | None = None
-    tries = [(FACTORS[0], tuple(start))] if free or start else []
-    tries += [] if free else [(factor, ()) for factor in FACTORS]
+    factors = FACTORS if factors is None else factors
+    tries = [(factors[0], tuple(start))] if free or start else []
+    tries += [] if free else [(factor, ()) for factor in factors]
+    captured: dict[Grid, Functional] = {}
     for factor, before in tries:
-        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log)
+        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, captured)
         if before and (best := _measured(matcher, False, log, began)).status == REACHED:
             break  # they do it as they are
         try:
@@ -174,12 +182,32 @@ def match_keyframes(
         failed = [arrival for arrival in best.arrivals if arrival.residual > tolerance]
         if stopped or not _rank(best)[0] or (failed and all(arrival.reason for arrival in failed)):
             break
-    return replace(best, history=tuple(log.history), evaluations=log.evaluations)
+    return replace(
+        best, history=tuple(log.history), evaluations=log.evaluations, seconds=_seconds(log, began)
+    )
+
+
+def _seconds(log: Log, began: float) -> dict[str, float]:
+    """Where the time went since then."""
+    total, spent = time.perf_counter() - began, log.seconds
+    return {
+        "simulation": spent.forward,
+        "adjoint": spent.backward,
+        "optimiser": total - spent.forward - spent.backward,
+        "total": total,
+    }
 
 
 def _rank(match: Match) -> tuple[bool, float]:
     """What makes a match worse than others: not to reach, or nearly to fold; then its residual."""
     return match.status != REACHED or match.jacobian[0] < NEARLY_FOLDED, match.residual
+
+
+def _solved_surely(fluid: Fluid) -> Fluid:
+    """The fluid; one whose viscosity moves with a diffusion as well solved as its gradient needs."""
+    if not fluid.viscosity_moves:
+        return fluid
+    return replace(fluid, diffusion_tolerance=min(fluid.diffusion_tolerance, SURE_TOLERANCE))
 
 
 def _snapped(t: float, timeline: Timeline) -> float:
@@ -207,9 +235,10 @@ class _Matcher:
         seed: int,
         factor: float,
         log: Log,
+        captured: dict[Grid, Functional],
     ):
         self.animation, self.particles, self.tolerance = animation, particles, tolerance
-        self._free, self._start, self._log = free, start, log
+        self._free, self._start, self._log, self._captured = free, start, log, captured
         grid = animation.grid
         self.ways = ways_of(particles, (grid.width, grid.height), seed)
         self._radii = radii_of(self.ways, factor)
@@ -255,7 +284,9 @@ class _Matcher:
     def _search(self, edges: list[int], coarse: Level, fine: Level) -> tuple[Level, Level]:
         """Search one span; both levels at its end."""
         animation = self.animation
-        scene = Scene(animation.fluid, self.given, self._free, animation.timeline, animation.device)
+        scene = Scene(
+            animation.fluid, self.given, self._free, animation.timeline, animation.device, self._captured
+        )
         span = self._span(edges, coarse, scene)
         search = Search(scene, span, self.tolerance, self._log)
         self._searches.append(search)
@@ -371,13 +402,6 @@ def _measured(matcher: _Matcher, stopped: bool, log: Log, began: float) -> Match
     reached = all(arrival.residual <= matcher.tolerance for arrival in arrivals)
     if not reached:
         arrivals = [replace(arrival, reason=_reason(arrival, arrivals, animation)) for arrival in arrivals]
-    total = time.perf_counter() - began
-    seconds = {
-        "simulation": log.seconds.forward,
-        "adjoint": log.seconds.backward,
-        "optimiser": total - log.seconds.forward - log.seconds.backward,
-        "total": total,
-    }
     return Match(
         whole,
         found,
@@ -388,7 +412,7 @@ def _measured(matcher: _Matcher, stopped: bool, log: Log, began: float) -> Match
         REACHED if reached else STOPPED if stopped else UNREACHABLE,
         tuple(log.history),
         log.evaluations,
-        seconds,
+        _seconds(log, began),
     )
 
 

@@ -53,13 +53,26 @@ class Reversed:
     """The same for the sources of each density."""
 
 
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Steps of a timeline that are run."""
+
+    first: int
+    """The first of them."""
+    last: int
+    """The step before which they end."""
+    begun: State | None
+    """The fluid at the first; None at rest."""
+    points: np.ndarray
+    """Where particles begin [longer side], (n, 2)."""
+
+
 class Recording:
     """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
 
-    Its steps count from 0 at rest, or from `begin`: a step of the timeline and the state it starts with; they
-    end with the timeline's, or before the timeline's step `last`.
-    `terms` are objectives of the state after some steps. With `effort` half the squares of what forces add
-    count too.
+    It runs over a `Stretch` of the timeline. `terms` are objectives of the state after some steps. With
+    `effort` half the squares of what forces add count too. With `room` for more steps than it has it can be
+    `moved` to other stretches.
 
     Raises:
         ValueError: a memory cap too small, with the least that works.
@@ -71,25 +84,23 @@ class Recording:
         stages: Stages,
         setup: Setup,
         timeline: Timeline,
-        points: np.ndarray,
+        stretch: Stretch,
         terms: Mapping[int, Sequence[Term]],
         memory_mb: float | None = None,
         of_viscosity: bool = False,
-        effort: float = 0.0,
-        begin: tuple[int, State] | None = None,
-        last: int | None = None,
+        effort: bool = False,
+        room: int = 0,
     ):
         self.stages, self.timeline, self.device = stages, timeline, stages.device
-        self._first, self._begun = begin or (0, None)
-        self.steps = (timeline.steps if last is None else last) - self._first
-        self._terms, self._points = terms, points
+        self._stretch, self._terms = stretch, terms
         self._term_replays: dict[Callable, Replay] = {}
         grid, device = stages.grid, stages.device
-        self._effort = effort * grid.hx * grid.hy / timeline.dt
+        self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
         load_kernels(device)
         self._adjoint = StepAdjoint(stages, timeline.dt, of_viscosity, self._effort)
         self._before, self._after, self._bar, self._after_bar = (
-            State.at_rest(grid, device, len(stages.densities), len(points)) for _ in range(WORKING_STATES)
+            State.at_rest(grid, device, len(stages.densities), len(stretch.points))
+            for _ in range(WORKING_STATES)
         )
         self._before.take_gradient(self._bar)
         self._after.take_gradient(self._after_bar)
@@ -97,8 +108,9 @@ class Recording:
         self._end.take_gradient(self._after_bar)
         self.schedule = self._planned(memory_mb)
         longest = max(end - start for start, end in self.schedule.segments)
-        rows = self.steps if self.schedule.keeps_all else longest
+        rows = max(self.steps, room) if self.schedule.keeps_all else longest
         stored = 0 if self.schedule.keeps_all else len(self.schedule.segments)
+        self.room = rows
         self._states = [Table(a, rows + 1) for a in self._kept(self._before)]
         self._stored = [Table(a, stored) for a in self._kept(self._before)]
         self._impulses = Impulses(setup.forces, setup.fluid, grid, device, gradients=True)
@@ -118,6 +130,35 @@ class Recording:
 
     schedule: Schedule
     """How its segments are kept and stored."""
+    room: int
+    """Steps that are kept at once."""
+
+    @property
+    def steps(self) -> int:
+        """How many steps it has."""
+        return self._stretch.last - self._stretch.first
+
+    def moved(self, setup: Setup, stretch: Stretch) -> None:
+        """Run over another stretch, for which there is room, with as many points, and with another setup.
+
+        Raises:
+            ValueError: as `set`.
+        """
+        self._stretch = stretch
+        self.schedule = self._planned(None)
+        self.set(setup)
+
+    def suits(self, setup: Setup, stretch: Stretch, effort: bool) -> bool:
+        """Whether it may be `moved` to a stretch and a setup of the same fluid."""
+        return (
+            self.schedule.keeps_all
+            and not self._terms
+            and effort == bool(self._effort)
+            and stretch.last - stretch.first <= self.room
+            and len(stretch.points) == len(self._stretch.points)
+            and setup.fluid is self.stages.fluid
+            and Impulses.key(setup.forces) == Impulses.key(self._setup.forces)
+        )
 
     def _kept(self, state: State) -> list[wp.array]:
         """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
@@ -150,7 +191,7 @@ class Recording:
 
     def time_of(self, step: int) -> float:
         """When a step begins [s]."""
-        return self.timeline.time_of(self._first + step)
+        return self.timeline.time_of(self._stretch.first + step)
 
     @exclusive
     def set(self, setup: Setup) -> None:
@@ -161,9 +202,9 @@ class Recording:
         """
         self._setup, stages, dt = setup, self.stages, self.timeline.dt
         rows, swelled = [], False
-        before = min(1, self._first)  # the step before decides what of its pressure is kept
+        before = min(1, self._stretch.first)  # the step before decides what of its pressure is kept
         for step in range(-before, self.steps):
-            kept = stages.kept(dt, dt if self._first + step else 0.0, swelled)
+            kept = stages.kept(dt, dt if self._stretch.first + step else 0.0, swelled)
             t, until = self.time_of(step), self.time_of(step + 1)
             rows.append(self._impulses.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
             swelled = self._impulses.prescribed > 0
@@ -374,10 +415,10 @@ class Recording:
     def _begin(self) -> None:
         """The state at the beginning: what was given, or at rest but for the velocity."""
         state, stages, grid = self._before, self.stages, self.stages.grid
-        for p, column, h in zip(state.particles, self._points.T, (grid.hx, grid.hy), strict=True):
+        for p, column, h in zip(state.particles, self._stretch.points.T, (grid.hx, grid.hy), strict=True):
             p.assign(column / h)
-        if self._begun:
-            for a, b in zip(self._begun.fields, state.fields, strict=True):
+        if self._stretch.begun:
+            for a, b in zip(self._stretch.begun.fields, state.fields, strict=True):
                 wp.copy(b, a)
             return
         for a in state.fields:

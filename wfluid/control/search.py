@@ -52,8 +52,8 @@ CHANGE = {MARCH: 1e-2, COARSE: 1e-3, FINE: 1e-3}
 ROUNDS = {COARSE: 12, FINE: 8}
 """Most minimisations of a stage."""
 
-NEAR = {MARCH: 0.0, COARSE: 0.5, FINE: 0.4}
-"""Parts of the tolerance: misfits at which a stage ends."""
+NEAR = {COARSE: 0.5, FINE: 0.4}
+"""Parts of the tolerance: misfits of keyframes at which a stage ends; a march is led by more than these."""
 
 NEAR_ENOUGH = 0.5
 """Part of the tolerance: misfit at which the weight needs no lowering."""
@@ -131,6 +131,8 @@ class Scene:
     """Its steps."""
     device: str | None
     """Where it is computed."""
+    captured: dict[Grid, Functional]
+    """The last functional on each grid: the next one takes over its graphs, if it can."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +215,7 @@ class Search:
         """The level at the end of the span, or at a step."""
         step = self._span.edges[-1] if step is None else step
         journey = Journey(self._span.ways, level.points, [self._time_of(step)], self._unit)
-        functional = self._functional(level, step, journey, self._all_free(), 0.0)
+        functional = self._functional(level, step, journey, self._all_free(), self._weight)
         state = functional.state_after(functional.start)
         return Level(level.grid, (self._time_of(step), state), state.points)
 
@@ -236,18 +238,22 @@ class Search:
     def _functional(
         self, level: Level, last: int, journey: Journey, free: Sequence[Free], weight: float
     ) -> Functional:
-        scene = self._scene
-        return Functional(
+        scene, edges = self._scene, self._span.edges
+        functional = Functional(
             level.grid,
             scene.fluid,
             (*self.given, *self.forces),
             scene.timeline,
-            journey + (weight / self._typical_effort) * Effort() if weight else journey,
+            journey + (weight / self._typical_effort) * Effort(),
             free,
             begin=level.begin,
             end=self._time_of(last),
             device=scene.device,
+            like=scene.captured.get(level.grid),
+            room=self._time_of(edges[-1]) - self._time_of(edges[0]),
         )
+        scene.captured[level.grid] = functional
+        return functional
 
     def _moments(self, first: int, last: int) -> list[float]:
         """Times of keyframes in a stretch; between them ends and middles of windows."""
@@ -289,7 +295,8 @@ class Search:
             )
             log.history.append(progress)
             stopped = bool(log.heed(progress))
-            return stopped or progress.worst <= NEAR[stage] * self._tolerance
+            near = not marches and progress.worst <= NEAR[stage] * self._tolerance
+            return stopped or near
 
         settings = Settings(
             memory=MEMORY,
