@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.blur import blurred
 from wfluid.envelopes import Constant, Envelope
 from wfluid.forces import FORCE_LIMIT, FieldForce, before, mean_with_before, on_faces
 from wfluid.grid import Grid
@@ -82,7 +83,7 @@ class ImageForce(FieldForce):
             force = [mean_with_before(centres[..., n], 1 - n, walls.periodic[n]) for n in (0, 1)]
         else:
             values = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
-            values = _blurred(values, grid, self.radius, walls.periodic)
+            values = blurred(values, grid, self.radius, walls.periodic)
             if np.ptp(values) < _FLAT:
                 raise ValueError("ImageForce: blurred to the grid's cells the picture has no slopes left")
             force = _slopes(values, grid, self.kind, walls.periodic)
@@ -130,17 +131,3 @@ def _slopes(values: np.ndarray, grid: Grid, kind: str, periodic: tuple[bool, boo
         padded = np.pad(padded, width, mode="wrap" if wraps else "edge")
     nodes = (padded[1:, 1:] + padded[1:, :-1] + padded[:-1, 1:] + padded[:-1, :-1]) / 4
     return [np.diff(nodes, axis=0)[:, :-1] / grid.hy, -np.diff(nodes, axis=1)[:-1] / grid.hx]
-
-
-def _blurred(values: np.ndarray, grid: Grid, radius: float, periodic: tuple[bool, bool]) -> np.ndarray:
-    """The values at centres under a Gaussian of sigma `radius`, whose weights sum to one at every wall."""
-    for axis, (n, h, wraps) in enumerate(((grid.ny, grid.hy, periodic[1]), (grid.nx, grid.hx, periodic[0]))):
-        if radius < 0.1 * h:
-            continue
-        distance = np.abs(np.arange(n)[:, None] - np.arange(n)) * h
-        if wraps:
-            distance = np.minimum(distance, n * h - distance)
-        weights = np.exp(-0.5 * (distance / radius) ** 2)
-        weights /= weights.sum(axis=1, keepdims=True)
-        values = weights @ values if axis == 0 else values @ weights.T
-    return values

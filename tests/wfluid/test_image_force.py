@@ -49,10 +49,10 @@ def test_the_blur_takes_fine_grain_and_keeps_what_is_wide():
     grid, radius = Grid(128, 4, 1.0, 4 / 128), 0.03
     x = (np.arange(128) + 0.5) / 128
     fine, wide = (0.5 + 0.25 * np.cos(2 * np.pi * n * x) + 0 * grid.ny for n in (8, 1))
-    from wfluid.image_force import _blurred
+    from wfluid.blur import blurred
 
     for values, n in ((fine, 8), (wide, 1)):
-        got = _blurred(np.broadcast_to(values, (4, 128)), grid, radius, WRAPPED.periodic)[0]
+        got = blurred(np.broadcast_to(values, (4, 128)), grid, radius, WRAPPED.periodic)[0]
         left = np.exp(-0.5 * (2 * np.pi * n * radius) ** 2)
         np.testing.assert_allclose(got - 0.5, left * (values - 0.5), atol=1e-4)
 
