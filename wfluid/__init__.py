@@ -55,6 +55,8 @@ _HOME = {
     "ImageForce": "image_force",
     "LookUp": "look_up",
     "Seam": "loops",
+    "Morph": "morphing.morph",
+    "morph": "morphing.morph",
     "NoiseForce": "noise_force",
     "write_animation": "output",
     "Freeze": "painted",

@@ -145,7 +145,7 @@ class Animation:
             return runner.moments(self._acting, self.timeline.frames - 1)
         return looping(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
 
-    def _look_up(self, picture: Picture) -> LookUp:
+    def look_up(self, picture: Picture) -> LookUp:
         """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
         width, height = self.width or self.picture.width, self.height or self.picture.height
         return LookUp(
@@ -162,8 +162,8 @@ class Animation:
     def frames(self) -> Iterator[Frame]:
         """Run the animation from rest, one frame at a time."""
         clock, walls = time.perf_counter, self.fluid.walls
-        shown = self._look_up(self.picture)
-        layers = {name: self._look_up(layer) for name, layer in self.layers.items()}
+        shown = self.look_up(self.picture)
+        layers = {name: self.look_up(layer) for name, layer in self.layers.items()}
         moments = self._moments()
         for index in range(self.frame_count):
             began = clock()

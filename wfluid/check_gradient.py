@@ -38,9 +38,8 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
     Raises:
         ValueError: a scene that has nothing to vary, or that cannot run.
     """
-    animation, aims = stage_all(
-        scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr)
-    )
+    staged = stage_all(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
+    animation, aims = staged.animation, staged.aims
     functional = _functional(replace(animation, cells=cells), aims)
     grid, steps = functional.grid, functional.timeline.steps
     seen = "mean square of " + " and ".join(["the displacement", *animation.fluid.density_names])

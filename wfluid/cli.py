@@ -1,4 +1,4 @@
-"""The command line: wfluid animate, keyframes, render, check-gradient, warmup; wfluid --version.
+"""The command line: wfluid animate, keyframes, morph, render, check-gradient, warmup; wfluid --version.
 
 Exit codes: 0 done, 1 the run failed, 2 bad input (one line on stderr), 130 interrupted.
 """
@@ -18,6 +18,7 @@ from typing import NoReturn
 EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 
 KEYFRAMES_EXAMPLE = "wfluid keyframes cat.png -o look.gif --move 210,160:230,140 --pin 300,220"
+MORPH_EXAMPLE = "wfluid morph cat.png raccoon_face.png --points cat_to_raccoon.csv -o morph.gif"
 EXAMPLE = "wfluid animate raccoon.jpg -o nose.gif --push 621,451:22,15:period=1,radius=55"
 
 
@@ -116,6 +117,8 @@ def _parser() -> Parser:
     animate.set_defaults(run=run_animate)
     animate.add_argument("picture", metavar="PICTURE", help="the picture to animate")
     _drawn(animate)
+    _made(animate)
+    _followed(animate)
     _shot(animate)
     _running(animate)
     _common(animate)
@@ -136,9 +139,12 @@ def _parser() -> Parser:
     add("--plot", **_PLOT)
     add("--tolerance", type=float, help="how far from its place a point may end [px] (0.25 of 512)")
     _drawn(keyframes)
+    _made(keyframes)
+    _followed(keyframes)
     _shot(keyframes)
     _running(keyframes)
     _common(keyframes)
+    _add_morph(verbs)
     render = verbs.add_parser(
         "render",
         help="run a scene file",
@@ -181,9 +187,49 @@ def _parser() -> Parser:
     return parser
 
 
-def _shot(parser: argparse.ArgumentParser) -> None:
-    """The flags of grid, time and frames."""
+def _add_morph(verbs) -> None:
+    morph = verbs.add_parser(
+        "morph",
+        help="let one picture flow into another",
+        description="Let one picture flow into another through points of both: the flow that takes the ones "
+        "to the others is found. Exits with 1 if a point stays away by more than the tolerance.",
+        epilog=f"example: {MORPH_EXAMPLE}",
+    )
+    unused = {"push": [], "vortex": [], "grow": [], "stroke": [], "wind": [], "noise": [], "force_image": []}
+    unused |= {"ink": [], "smoke": [], "layer": [], "track": [], "tracks": None, "effect_mask": None}
+    morph.set_defaults(run=run_animate, time=None, loop=None, substeps=None, **unused)
+    add = morph.add_argument
+    add("picture", metavar="A", help="the picture to begin with")
+    add("to", metavar="B", help="the picture that it flows into")
+    add("-o", "--output", **_OUTPUT)
+    add("--points", metavar="FILE.csv", help="points that correspond: x in A, y in A, x in B, y in B [px]")
+    add("--move", **_repeated("X0,Y0:X1,Y1", "the point X0,Y0 of A is X1,Y1 of B [px]"))
+    add("--pin", **_repeated("X,Y", "this point of A should stay [px]"))
+    add("--fit", help="how B covers A's frame: fill, fit (with bars) or stretch (fill)")
+    add("--warp-curve", help="how far the flow is: linear, ease, or keys S:PART,… of 0 … 1 (ease)")
+    add("--blend-curve", help="how much of B is seen, the same (ease)")
+    add("--blend", help="what is mixed: linear light, or display values (linear)")
+    add(
+        "--timing",
+        metavar="MASK[:DELAY]",
+        help="a mask, white where it happens first, black DELAY later (0.5)",
+    )
+    add("--reverse", action="store_true", help="from B to A: the same frames, the last one first")
+    add("--pingpong", action="store_true", help="there and back")
+    add("--tolerance", type=float, help="how far from its place a point may end [px] (0.5 of 512)")
+    add("--plot", **_PLOT)
+    _made(morph)
+    _shot(morph)
+    _running(morph)
+    _common(morph)
+
+
+def _followed(parser: argparse.ArgumentParser) -> None:
+    """The flags of what goes with the picture, and of the steps."""
     number = parser.add_argument
+    number("--effect-mask", metavar="MASK", help="a mask, white where the forces act")
+    number("--substeps", type=int, help="steps a frame (so many that dt <= 1/96 s; for keyframes 1/48 s)")
+    number("--loop", help="oscillate, pingpong or crossfade: the end meets the beginning")
     number("--track", metavar="X,Y", action="append", default=[], help="follow this point; repeatable")
     number("--tracks", metavar="FILE.csv", help="write where the followed points go")
     number(
@@ -193,6 +239,11 @@ def _shot(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="a picture or matte that goes through the same map, written beside OUT as OUT_FILE; repeatable",
     )
+
+
+def _shot(parser: argparse.ArgumentParser) -> None:
+    """The flags of grid, time and frames."""
+    number = parser.add_argument
     number("--cells", type=int, help="cells along the longer side (256)")
     number("--walls", help="free-slip (default), no-slip, periodic, or two of them as X,Y")
     number("--scheme", help="standard (default), or paper: Euler, bilinear, Jacobi, phase 0")
@@ -200,8 +251,6 @@ def _shot(parser: argparse.ArgumentParser) -> None:
     number("--pressure-cycles", type=int, help="multigrid cycles a projection (3)")
     number("--fps", type=float, help="frames a second (15)")
     number("--duration", type=float, help="length [s] (2; of keyframes, to the last)")
-    number("--substeps", type=int, help="steps a frame (so many that dt <= 1/96 s; for keyframes 1/48 s)")
-    number("--loop", help="oscillate, pingpong or crossfade: the end meets the beginning")
     number("--seed", type=int, help="of noises that name none (0)")
     number("--width", type=int, help="width of the frames [px] (the picture's)")
     number("--scale", type=float, help="size of the frames as a factor, instead of --width")
@@ -219,11 +268,14 @@ def _repeated(metavar: str, text: str) -> dict:
     return {"metavar": metavar, "action": "append", "default": [], "help": f"{text}; repeatable"}
 
 
+_OUTPUT = _repeated("OUT", "x.gif, x.mp4, x.webm, or a sequence such as x.####.png")
+
+
 def _drawn(parser: argparse.ArgumentParser) -> None:
-    """The flags that say what moves the picture, and what it is made of."""
+    """The flags that say what moves the picture."""
     add = parser.add_argument
     course = "start, end, at, period, phase, rise, fall, strength"
-    add("-o", "--output", **_repeated("OUT", "x.gif, x.mp4, x.webm, or a sequence such as x.####.png"))
+    add("-o", "--output", **_OUTPUT)
     add(
         "--push",
         **_repeated(
@@ -247,13 +299,21 @@ def _drawn(parser: argparse.ArgumentParser) -> None:
     pours = "keys radius, amount, diffusion, lift [px], start, end, at, rise, fall"
     add("--ink", **_repeated("X,Y:#RRGGBB[:…]", f"pour ink of a colour; {pours}"))
     add("--smoke", **_repeated("X,Y:#RRGGBB[:…]", f"pour smoke of a colour; {pours}"))
-    add("--viscosity", type=float, help="viscosity [longer side^2/s] (0.001); of white, with an image (0.1)")
+
+
+def _made(parser: argparse.ArgumentParser) -> None:
+    """The flags that say what the picture is made of."""
+    add = parser.add_argument
+    add(
+        "--viscosity",
+        type=float,
+        help="viscosity [longer side^2/s] (0.001, keyframes 0.005, morph 0.03); of an image's white (0.1)",
+    )
     add("--viscosity-image", metavar="FILE|self", help="a picture that is bright where the fluid is stiff")
     add("--viscosity-floor", type=float, help="viscosity where the viscosity image is black (0)")
     add("--invert-viscosity", action="store_true", help="stiff where the viscosity image is dark")
     add("--viscosity-moves", action="store_true", help="take the viscosity image along with the picture")
     add("--freeze", metavar="MASK[:STRENGTH]", help="a mask, white where the picture stays (drag 10000/s)")
-    add("--effect-mask", metavar="MASK", help="a mask, white where the forces act")
 
 
 def _running(parser: argparse.ArgumentParser) -> None:

@@ -39,6 +39,7 @@ _FORCE_FLAGS = {
 _OF_FLUID = ("cells", "walls", "scheme", "solver", "pressure_cycles")
 _OF_TIME = ("duration", "fps", "substeps", "loop")
 _OF_FRAMES = ("width", "scale", "filter", "edge")
+_OF_MORPH = ("fit", "warp_curve", "blend_curve", "blend", "reverse", "pingpong")
 _OF_STILLS = ("start", "type", "compression", "quality")
 
 
@@ -58,6 +59,10 @@ _FLAGS = {
     **_flags(("frames",), keys=_OF_FRAMES),
     ("keyframes", "tolerance"): "--tolerance",
     ("keyframes", "pins"): "--pin",
+    ("morph", "to"): "B",
+    **_flags(("morph",), keys=_OF_MORPH),
+    ("morph", "timing"): "--timing",
+    ("morph", "delay"): "--timing MASK:DELAY",
     ("tracks",): "--track",
     **_flags(*(("output", n) for n in range(8)), keys=_OF_STILLS),
 }
@@ -207,7 +212,9 @@ def scene_of(options: argparse.Namespace) -> Scene:
             if lift:
                 flags["force", len(tables["force"])] = f"--{look} {text}"
                 tables["force"].append(lift)
-    if options.verb == "keyframes":
+    if options.verb == "morph":
+        tables["morph"] = _morph(options)
+    if options.verb in ("keyframes", "morph"):
         tables["keyframes"], names = _keyframes(options)
         flags |= {("keyframes", "move", n): name for n, name in enumerate(names)}
     tables["layer"] = [{"name": _layer_name(file), "file": file} for file in options.layer]
@@ -238,8 +245,10 @@ def parse_move(text: str) -> dict[str, Any]:
 
 def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
     """Moves, those of a file among them, and pins; and what of the command line each move comes from."""
+    morphs = options.verb == "morph"
     if not (options.move or options.points):
-        raise ValueError("where to? give at least one --move X0,Y0:X1,Y1[@T], or --points FILE.csv")
+        form = "X0,Y0:X1,Y1" + ("" if morphs else "[@T]")
+        raise ValueError(f"where to? give --points FILE.csv, or at least one --move {form}")
     moves = [parse_move(text) for text in options.move]
     names = [f"--move {text}" for text in options.move]
     for row in read_points(options.points) if options.points else ():
@@ -248,10 +257,36 @@ def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
             moves[-1]["time"] = row.time
         names.append(f"--points {options.points}:{row.line}")
     latest = next(time for time in (options.time, options.duration, KEYFRAME_TIME) if time is not None)
-    table: dict[str, Any] = {"move": [{**move, "time": move.get("time", latest)} for move in moves]}
+    timed = moves if morphs else [{**move, "time": move.get("time", latest)} for move in moves]
+    table: dict[str, Any] = {"move": timed}
     if options.pin:
         table["pins"] = [_pair(f"pin {text!r}", "the point X,Y", text) for text in options.pin]
     return {**table, **_given(options, "tolerance")}, names
+
+
+def _morph(options: argparse.Namespace) -> dict[str, Any]:
+    """The other picture, and how it goes."""
+    table = {"to": options.to, **_given(options, "fit", "blend")}
+    for key in ("warp_curve", "blend_curve"):
+        text = getattr(options, key)
+        if text is not None:
+            what = f"--{key.replace('_', '-')} {text!r}"
+            table[key] = [_key(what, part) for part in text.split(",")] if ":" in text else text
+    if options.timing is not None:
+        name, colon, number = options.timing.rpartition(":")
+        try:
+            table |= {"timing": name, "delay": float(number)} if colon else {"timing": options.timing}
+        except ValueError:
+            table["timing"] = options.timing
+    return table | {key: True for key in ("reverse", "pingpong") if getattr(options, key)}
+
+
+def _key(what: str, text: str) -> list[float]:
+    """A key of a curve, "S:PART"."""
+    parts = text.split(":")
+    if len(parts) != 2:
+        raise ValueError(f"{what}: {text!r} is not SECONDS:PART")
+    return [_number(what, "a key", part) for part in parts]
 
 
 def _given(options: argparse.Namespace, *names: str) -> dict[str, Any]:

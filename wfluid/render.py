@@ -22,6 +22,9 @@ from wfluid.estimate import check_memory, estimate
 from wfluid.files import readable_size
 from wfluid.interrupt import HeldInterrupt
 from wfluid.keyframe_plot import check_plot, plot_match
+from wfluid.morphing.morph import FACTORS as FACTORS_OF_MORPH
+from wfluid.morphing.morph import Course, Morph
+from wfluid.morphing.pairing import Pair
 from wfluid.output import check_folder, names, open_output
 from wfluid.picture import Picture, write_picture
 from wfluid.preview import draw_controls
@@ -84,8 +87,9 @@ def run_scene(scene: Scene, how: Run) -> int:
     _check_names(scene, how)
 
     notes: list[str] = []
-    animation, aims = stage_all(scene, how.device, notes.append)
-    check_memory(animation, _kept_frames(scene.outputs))
+    staged = stage_all(scene, how.device, notes.append)
+    animation, aims, course = staged.animation, staged.aims, staged.course
+    check_memory(animation, _kept_frames(scene.outputs), course)
     writers = [] if how.preview or how.dry_run else _writers(scene, animation)
 
     def note(text: str) -> None:
@@ -94,19 +98,22 @@ def run_scene(scene: Scene, how: Run) -> int:
 
     for text in notes:  # said only now: what is refused is one line
         note(text)
-    sized = _with_size(scene, animation.picture)
+    sized = _with_sizes(scene, animation.picture, staged.pair)
     searches = aims is not None and not (how.preview or how.dry_run)
     if how.save_scene and not searches:
         write_scene(how.save_scene, sized)
     if how.dry_run:
-        _say_plan(animation, scene.outputs)
+        _say_plan(animation, scene.outputs, course)
+        if aims:
+            print(f"search    {len(aims.keyframes)} keyframes' forces first, for which time is not counted")
         return 0
     if how.preview:
         write_picture(how.preview, draw_controls(scene, animation, aims))
     if how.preview or not (scene.outputs or searches):
         return 0
     _load(animation, how.quiet)
-    match = _matched(animation, aims, how) if searches else None
+    match = _matched(animation, aims, how, FACTORS_OF_MORPH if course else None) if searches else None
+    morph = Morph(match, staged.pair, course) if match and course else None
     if match:
         animation = match.animation
         if how.save_scene:
@@ -114,8 +121,10 @@ def run_scene(scene: Scene, how: Run) -> int:
         if how.plot:
             plot_match(match, how.plot)
     if scene.outputs:
-        report = Report(animation, match, aims.side if aims else 1.0)
-        writing = _write_frames(animation, writers, report, how.quiet)
+        report = Report(animation, match, aims.side if aims else 1.0, morph)
+        writing = _write_frames(morph or animation, writers, report, how.quiet)
+        for text in morph.said if morph else ():
+            note(text)
         _judge_loop(animation, report, note)
         times = {"write": writing, "total": time.perf_counter() - began}
         for output in scene.outputs:
@@ -124,16 +133,18 @@ def run_scene(scene: Scene, how: Run) -> int:
     return _judge_match(match, aims.side) if match else 0
 
 
-def _with_size(scene: Scene, picture: Picture) -> Scene:
+def _with_sizes(scene: Scene, picture: Picture, pair: Pair | None) -> Scene:
     """The scene, saying what its pixels refer to."""
-    size = {"size": [picture.width, picture.height]}
-    tables = {**scene.tables, "picture": {**size, **scene.tables["picture"]}}
+    tables = dict(scene.tables)
+    tables["picture"] = {"size": [picture.width, picture.height], **tables["picture"]}
+    if pair:
+        tables["morph"] = {"size": list(pair.size), **tables["morph"]}
     return Scene(tables, scene.folder, scene.source, scene.lines, scene.flags)
 
 
 def _check_names(scene: Scene, how: Run) -> None:
     """Refuse to write over what is read, or one file twice."""
-    frames = scene.timeline.frames
+    frames = scene.frame_count
     taken = {path.resolve(): "a picture that is read" for path in scene.files()}
     taken[(scene.folder / scene.tables["picture"]["file"]).resolve()] = "the picture itself"
     taken[Path(scene.source).resolve()] = "the scene itself"
@@ -159,7 +170,7 @@ def _check_names(scene: Scene, how: Run) -> None:
             raise ValueError(f"{path}: {flag} is written as {ending}")
 
 
-def _matched(animation: Animation, aims: Aims, how: Run) -> Match:
+def _matched(animation: Animation, aims: Aims, how: Run, factors: Sequence[float] | None) -> Match:
     """Find the forces of keyframes, saying how far the search is; Ctrl-C ends it with the best so far."""
     with HeldInterrupt() as interrupt, SearchProgress(aims.side, how.quiet) as show:
 
@@ -176,6 +187,7 @@ def _matched(animation: Animation, aims: Aims, how: Run) -> Match:
             seed=aims.seed,
             progress=heed,
             side=aims.side,
+            factors=factors,
         )
 
 
@@ -207,7 +219,7 @@ def _writers(scene: Scene, animation: Animation) -> list[tuple[_Writer, Callable
             tracks = Tracks(output.file, max(width, height))
             found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
             continue
-        writer = open_output(output.file, animation.timeline.fps, output.start, output.encoding)
+        writer = open_output(output.file, scene.timeline.fps, output.start, output.encoding)
         found.append((writer, lambda frame, w=writer, of=output.of: w.write(_shown(frame, of))))
     return found
 
@@ -223,15 +235,19 @@ def _shown(frame: Frame, of: str) -> Picture:
     return Picture(values[..., None], dtype="float", data=True)
 
 
-def _say_plan(animation: Animation, outputs: Sequence[Output]) -> None:
+def _say_plan(animation: Animation, outputs: Sequence[Output], course: Course | None) -> None:
     """Print what a run would take and write."""
-    timeline, grid, guess = animation.timeline, animation.grid, estimate(animation, _kept_frames(outputs))
+    timeline, grid = animation.timeline, animation.grid
+    guess = estimate(animation, _kept_frames(outputs), course)
+    frames, fps = (
+        (len(course.order), course.timeline.fps) if course else (animation.frame_count, timeline.fps)
+    )
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     size = animation.width or animation.picture.width, animation.height or animation.picture.height
     print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")
     print(f"grid      {grid.nx} x {grid.ny} cells")
     print(f"steps     {steps} of {timeline.dt:.4g} s, {timeline.steps_per_frame} a frame")
-    print(f"frames    {animation.frame_count} of {size[0]} x {size[1]} pixels at {timeline.fps:g} a second")
+    print(f"frames    {frames} of {size[0]} x {size[1]} pixels at {fps:g} a second")
     print(f"memory    about {readable_size(guess.memory)}")
     print(f"time      about {guess.seconds:.1f} s on one core, without compiling and writing")
     print(f"writes    {', '.join(str(output.file) for output in outputs) or 'nothing'}")
@@ -260,7 +276,7 @@ def _judge_loop(animation: Animation, report: Report, note: Callable[[str], None
 
 
 def _write_frames(
-    animation: Animation,
+    animation: Animation | Morph,
     writers: Sequence[tuple[_Writer, Callable[[Frame], None]]],
     report: Report,
     quiet: bool,

@@ -15,6 +15,7 @@ from wfluid.control.match import Match
 from wfluid.files import whole_file
 from wfluid.forces import Force, flat
 from wfluid.linear import Residual
+from wfluid.morphing.morph import Morph, MorphFrame
 from wfluid.painted import Keyed, Painted, Quantity
 from wfluid.picture import PictureError
 
@@ -29,6 +30,8 @@ class Report:
     """What the search for its keyframes came to."""
     side: float = 1.0
     """The longer side in the pixels that keyframes are given in."""
+    morph: Morph | None = None
+    """The morph that the animation is the flow of."""
     frames: int = 0
     """Frames seen."""
     extremes: dict[str, float] = field(
@@ -47,6 +50,9 @@ class Report:
     solves: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Of projection and diffusion: the methods used, most iterations and largest residuals seen."""
 
+    of_b: list[float] = field(default_factory=lambda: [math.inf, -math.inf])
+    """Least and greatest det J of the map of a morph's second picture."""
+
     def add(self, frame: Frame) -> None:
         """Take a frame's figures."""
         side = max(self.animation.picture.width, self.animation.picture.height)
@@ -63,6 +69,9 @@ class Report:
             ("divergence_removed_max", abs(frame.solve.removed) if frame.solve else 0.0),
         ):
             seen[name] = max(seen[name], value)
+        if isinstance(frame, MorphFrame):
+            self.of_b[0] = min(self.of_b[0], frame.to_quality.jacobian_min)
+            self.of_b[1] = max(self.of_b[1], frame.to_quality.jacobian_max)
         if frame.solve:
             self._add_solve("projection", frame.solve.pressure)
             self._add_solve("diffusion", frame.solve.diffusion)
@@ -78,6 +87,11 @@ class Report:
             ("backward_error_max", left.backward),
         ):
             seen[key] = max(seen[key], value)
+
+    @property
+    def _steps(self) -> int:
+        timeline = self.animation.timeline
+        return timeline.steps if self.morph else max(self.frames - 1, 0) * timeline.steps_per_frame
 
     def _loop(self) -> dict[str, Any]:
         """What the loop's seam measures, where there is one."""
@@ -134,6 +148,36 @@ class Report:
             "search_seconds": match.seconds,
         }
 
+    def _morph(self) -> dict[str, Any]:
+        """How well a morph's two pictures meet."""
+        morph = self.morph
+        if morph is None:
+            return {}
+        mean, most = morph.inconsistency_px()
+        residuals = [float(value) for value in morph.residuals_of_b()]
+        window, course = morph.pair.window, morph.course
+        return {
+            "morph": {
+                "to": list(morph.pair.size),
+                "window": [window.x, window.y, window.width, window.height],
+                "residual_px": {
+                    "first": [arrival.residual * self.side for arrival in self.match.arrivals],
+                    "second": residuals,
+                },
+                "residual_max_px": {
+                    "first": self.match.residual * self.side,
+                    "second": max(residuals),
+                },
+                "jacobian": {
+                    "first": [self.extremes["jacobian_min"], self.extremes["jacobian_max"]],
+                    "second": self.of_b,
+                },
+                "inconsistency_px": {"mean": mean, "max": most},
+                "blend": course.blend,
+                "notes": [*morph.pair.said, *morph.said],
+            }
+        }
+
     def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
         """The report; `seconds` adds the times that the animation does not know."""
         animation, fluid = self.animation, self.animation.fluid
@@ -142,8 +186,8 @@ class Report:
             "picture": [animation.picture.width, animation.picture.height],
             "grid": [animation.grid.nx, animation.grid.ny],
             "frames": self.frames,
-            "fps": animation.timeline.fps,
-            "steps": max(self.frames - 1, 0) * animation.timeline.steps_per_frame,
+            "fps": (self.morph.course if self.morph else animation).timeline.fps,
+            "steps": self._steps,
             "settings": {
                 "viscosity": _described(fluid.viscosity),
                 "viscosity_moves": fluid.viscosity_moves,
@@ -169,6 +213,7 @@ class Report:
             "area": _area(self.extremes),
             **self._loop(),
             **self._keyframes(),
+            **self._morph(),
             "solves": self.solves,
             "device": str(animation.solver.device.name),
             "versions": versions(),

@@ -111,6 +111,31 @@ class Scene:
             if output.get("of") == "tracks" and not tables.get("tracks", {}).get("points"):
                 raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
 
+        if "morph" in tables:
+            self._check_morph(tables)
+
+    @staticmethod
+    def _check_morph(tables: Mapping[str, Any]) -> None:
+        """Refuse what a morph has no use for."""
+        keyframes = tables.get("keyframes", {})
+        if not (keyframes.get("move") or "points" in keyframes):
+            raise SchemaError(("keyframes",), "a morph needs points of both pictures: give move or points")
+        for key in ("force", "group", "density", "layer", "tracks", "effect"):
+            if tables.get(key):
+                raise SchemaError((key,), "a morph goes without: its flow follows from its points")
+        time, reason = tables.get("time", {}), "a morph goes without: its flow has steps of its own"
+        if "substeps" in time:
+            raise SchemaError(("time", "substeps"), reason)
+        if "loop" in time:
+            raise SchemaError(("time", "loop"), "a morph goes without: set pingpong of [morph]")
+        moves = [
+            ("keyframes", "move", n, "time")
+            for n, move in enumerate(keyframes.get("move", []))
+            if "time" in move
+        ]
+        for path in [*([("keyframes", "time")] if "time" in keyframes else []), *moves]:
+            raise SchemaError(path, "a morph goes without: its points arrive at its end")
+
     def with_values(self, settings: Sequence[str]) -> Scene:
         """The scene with some values set, each as "path=value"; the value is TOML, or else a text.
 
@@ -170,6 +195,16 @@ class Scene:
             of, start = table.get("of", "picture"), table.get("start", FIRST_FRAME)
             found.append(Output(self.folder / table["file"], of, start, encoding))
         return found
+
+    @property
+    def frame_count(self) -> int:
+        """Frames that are written, at most.
+
+        Raises:
+            SceneError: as `timeline`.
+        """
+        frames = self.timeline.frames
+        return 2 * frames - 2 if self.tables.get("morph", {}).get("pingpong") else frames
 
     @property
     def _last_keyframe(self) -> float | None:

@@ -12,6 +12,9 @@ from wfluid.fluid import SCHEMES, SOLVERS
 from wfluid.image_force import KINDS
 from wfluid.look_up import EDGES, FILTERS
 from wfluid.loops import LOOPS
+from wfluid.morphing.blending import LIGHTS
+from wfluid.morphing.pairing import FITS
+from wfluid.morphing.timing import CURVES, DELAY_LIMIT
 from wfluid.painted import DRAG_LIMIT, VISCOSITY_LIMIT
 from wfluid.picture import COLORSPACES, TYPES
 from wfluid.schema import (
@@ -58,6 +61,14 @@ def _color(value: Any) -> str:
 def _file(meaning: str, required: bool = False, kind: str = "painting") -> Key:
     return Key(meaning, **text(), required=required, file=kind)
 
+
+def _curve(value: Any) -> str | list[list[float]]:
+    if isinstance(value, str):
+        return word(*CURVES)["check"](value)
+    return _KEYS["check"](value)
+
+
+_KEYS = rows(2, 1, "linear, ease, or a list of keys, [[seconds, value], …]")
 
 _POINT = numbers(2, "two numbers, [x, y]")
 _PATH = rows(3, 2, "two rows or more of [seconds, x, y]")
@@ -406,6 +417,37 @@ SCENE = Table(
                     default="a quarter, of a picture of 512",
                 ),
                 "force": Many(_FOUND),
+            },
+        ),
+        "morph": Table(
+            "Another picture, into which this one flows; keyframes lead from points of this to points of it",
+            {
+                "to": _file("the other picture", required=True, kind="file"),
+                "size": Key(
+                    "frame size that its pixels refer to",
+                    **numbers(2, "two numbers, [width, height]"),
+                    unit="px",
+                    default="its own",
+                ),
+                "fit": Key("how it covers the frame", **word(*FITS), default="fill"),
+                "warp_curve": Key(
+                    "how far the flow is over time: linear, ease, or [[s, 0 … 1], …]",
+                    _curve,
+                    "a word or keys",
+                    default="ease",
+                ),
+                "blend_curve": Key(
+                    "how much of it is seen, the same", _curve, "a word or keys", default="ease"
+                ),
+                "blend": Key("what is mixed: light, or display values", **word(*LIGHTS), default="linear"),
+                "timing": _file("a mask, white where it happens first"),
+                "delay": Key(
+                    "how much later it happens where the mask is black, a part of the duration",
+                    **number(0, DELAY_LIMIT),
+                    default="0.5",
+                ),
+                "reverse": Key("from the other picture to this", **flag(), default="false"),
+                "pingpong": Key("there and back", **flag(), default="false"),
             },
         ),
         "output": Many(

@@ -93,6 +93,15 @@ class Solver:
             ghosts.fill(f)
         state.q.zero_()
 
+    @exclusive
+    def set_map(self, state: State, displacement: np.ndarray) -> None:
+        """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
+        self._check(state)
+        cells = displacement / (self.grid.hx, self.grid.hy)
+        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._stages.moved_ghosts, strict=True)):
+            from_numpy(cells[..., n], f, self.layout)
+            ghosts.fill(f)
+
     def step(
         self,
         state_in: State,
@@ -165,7 +174,10 @@ class Solver:
 
     @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
-        """Only carry the map along `state_in`'s velocity for dt; the velocity of `state_out` is untouched."""
+        """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
+
+        The velocity of `state_out` is untouched.
+        """
         self._check(state_in, state_out)
         impulses = self._impulses_for(())
         impulses.set((), self.fluid, 0.0, dt, dt)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,13 @@ from wfluid.envelopes import Constant, product
 from wfluid.fluid import Fluid
 from wfluid.forces import BlobForce, Force, GaussianForce, Group, flat
 from wfluid.loops import check_loop
-from wfluid.paintings import SAME_ASPECT, Paintings
+from wfluid.morphing.morph import FLOW, Course
+from wfluid.morphing.morph import TOLERANCE as MORPH_TOLERANCE
+from wfluid.morphing.morph import VISCOSITY as MORPH_VISCOSITY
+from wfluid.morphing.pairing import Pair, paired
+from wfluid.painted import Painted
+from wfluid.paintings import SAME_ASPECT, Paintings, named
+from wfluid.paths import Place
 from wfluid.picture import Picture, PictureError, read_picture
 from wfluid.point_file import read_points
 from wfluid.scene import Scene
@@ -40,13 +46,27 @@ def stage(
         SceneError: a value that makes no sense, with its key and line.
         PictureError: a file that cannot be read.
     """
-    return stage_all(scene, device, note)[0]
+    return stage_all(scene, device, note).animation
+
+
+@dataclass(frozen=True)
+class Staged:
+    """What a scene describes."""
+
+    animation: Animation
+    """Its animation, of a morph the flow."""
+    aims: Aims | None = None
+    """What it wants of its points, if it has keyframes."""
+    pair: Pair | None = None
+    """The pictures of a morph."""
+    course: Course | None = None
+    """How a morph goes."""
 
 
 def stage_all(
     scene: Scene, device: str | None = None, note: Callable[[str], None] = lambda text: None
-) -> tuple[Animation, Aims | None]:
-    """The animation that a scene describes, and what it wants of its points, if it has keyframes.
+) -> Staged:
+    """All that a scene describes.
 
     Raises:
         SceneError: as `stage`.
@@ -54,7 +74,7 @@ def stage_all(
     """
     try:
         staged = _Stage(scene, note)
-        return staged.animation(device), staged.aims
+        return Staged(staged.animation(device), staged.aims, staged.pair, staged.course)
     except SchemaError as error:
         raise scene.error(error) from error
 
@@ -65,12 +85,15 @@ class _Stage:
     def __init__(self, scene: Scene, note: Callable[[str], None]):
         self.scene, self.tables, self.note = scene, scene.tables, note
         self._fluid()  # what is wrong without files is said before they are read
-        self.timeline = scene.timeline
+        self.morph = self.tables.get("morph")
+        self.timeline = FLOW if self.morph else scene.timeline
         self.loop = self.tables.get("time", {}).get("loop")
         picture = self.tables["picture"]
         self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
         self.paintings = Paintings(self.picture, scene.folder, note)
         self.drawing = self._drawing()
+        self.pair = _at(("morph",), self._pair) if self.morph else None
+        self.course = _at(("morph",), self._course) if self.morph else None
         self.aims = _at(("keyframes",), self._aims) if "keyframes" in self.tables else None
 
     def animation(self, device: str | None) -> Animation:
@@ -99,6 +122,48 @@ class _Stage:
         if self.loop:
             _at(("time", "loop"), lambda: check_loop(self.loop, flat(forces)))
         return _at(("frames",), make)
+
+    def _pair(self) -> Pair:
+        """The two pictures of a morph."""
+        name = self.scene.folder / self.morph["to"]
+        other = read_picture(name, self.tables["picture"].get("colorspace", "auto"))
+        pair = paired(self.picture, other, self.morph.get("fit", "fill"))
+        for text in pair.said:
+            self.note(text)
+        width, height = self.morph.get("size", pair.size)
+        if min(width, height) <= 0:
+            raise SchemaError(("morph", "size"), f"{width:g} x {height:g}: expected positive numbers")
+        if abs(width / height * other.height / other.width - 1) > SAME_ASPECT:
+            raise SchemaError(
+                ("morph", "size"),
+                f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
+                f"{other.width} x {other.height} have another aspect",
+            )
+        return pair
+
+    def _course(self) -> Course:
+        """How a morph goes."""
+        given = {
+            key: self.morph[key]
+            for key in ("warp_curve", "blend_curve", "blend", "delay", "reverse", "pingpong")
+            if key in self.morph
+        }
+        for key in ("warp_curve", "blend_curve"):
+            if not isinstance(given.get(key, ""), str):
+                given[key] = dict(given[key])
+        if "timing" in self.morph:
+            name = self.morph["timing"]
+            given["mask"] = named(name, lambda: Painted(self.paintings.paint(name)))
+        elif "delay" in given:
+            raise ValueError("delay needs a timing mask")
+        return Course(self.scene.timeline, **given)
+
+    def _place_in_b(self, what: str, place: list[float]) -> Place:
+        """Where in the frame a point of a morph's second picture is seen [longer side]."""
+        (width, height), size = self.pair.size, self.morph.get("size", self.pair.size)
+        x, y = place[0] / size[0] * width, place[1] / size[1] * height
+        side = self.drawing.side
+        return self.pair.place((x, y), (self.drawing.width / side, self.drawing.height / side))
 
     def _drawing(self) -> Drawing:
         """What the numbers of the scene's forces refer to."""
@@ -144,23 +209,30 @@ class _Stage:
         if "points" in table:
             for row in read_points(self.scene.folder / table["points"]):
                 time = latest if row.time is None else row.time
+                if self.morph and row.time is not None:
+                    raise SchemaError(
+                        ("keyframes", "points"), "a morph goes without times: its points arrive at its end"
+                    )
                 moves.append((("keyframes", "points"), row.source, row.target, time, 1.0))
         timeline = self.timeline
         if timeline.substeps is None:
             substeps = substeps_for([move[3] for move in moves], timeline.fps, KEYFRAME_STEPS)
             timeline = self.timeline = replace(timeline, substeps=substeps)
         place = drawing.place
+        place_to = self._place_in_b if self.morph else place
 
         def keyframe(a: list[float], b: list[float], time: float, weight: float) -> ParticleKeyframe:
-            return ParticleKeyframe(place("from", a), place("to", b), self._on_step(time, timeline), weight)
+            return ParticleKeyframe(
+                place("from", a), place_to("to", b), self._on_step(time, timeline), weight
+            )
 
         keyframes = tuple(_at(path, partial(keyframe, *numbers)) for path, *numbers in moves)
-        side = drawing.side
+        side, tolerance = drawing.side, MORPH_TOLERANCE if self.morph else TOLERANCE
         aims = Aims(
             keyframes,
             tuple(place("a pin", pin) for pin in table.get("pins", [])),
             tuple(_found(found, side) for found in table.get("force", [])),
-            table["tolerance"] / side if "tolerance" in table else TOLERANCE,
+            table["tolerance"] / side if "tolerance" in table else tolerance,
             self.tables.get("seed", 0),
             side,
         )
@@ -187,6 +259,8 @@ class _Stage:
     def _whole_fluid(self) -> Fluid:
         """The fluid with all that is painted and dissolved."""
         viscosity, densities = self.tables.get("viscosity", {}), self.tables.get("density", [])
+        if self.morph and not viscosity:
+            viscosity = {"value": MORPH_VISCOSITY}
         return self._fluid(
             viscosity=_at(("viscosity",), lambda: self.paintings.viscosity(viscosity)),
             viscosity_moves=viscosity.get("moves", False),

@@ -116,7 +116,7 @@ def test_the_value_is_that_of_the_rendered_frame(device, name):
         assert factor.std() > 0.05
     term = PictureMisfit(picture, target, 1.0, **how, weight=weight).term(stages, 3.0, slice(0, 0))
     term.measure(state)
-    frame = animation._look_up(picture).render(state.d_x, state.d_y).pixels
+    frame = animation.look_up(picture).render(state.d_x, state.d_y).pixels
     squares = factor[..., None] * (frame.astype(np.float64) - target.pixels) ** 2
     area = animation.grid.width * animation.grid.height / (target.width * target.height)
     rounding = (target.width + 4) * float(np.finfo(np.float32).eps)

@@ -35,7 +35,8 @@ def folder(tmp_path, monkeypatch):
 
 def staged(folder, keyframes, **more):
     scene = {"wfluid": 1, "picture": {"file": "small.png"}, "keyframes": keyframes, **more}
-    return stage_all(Scene(scene, folder))
+    staged = stage_all(Scene(scene, folder))
+    return staged.animation, staged.aims
 
 
 CASES = {
@@ -112,7 +113,7 @@ def test_a_time_between_all_steps_is_met_at_the_nearest_and_said(folder):
     said = []
     scene = {"wfluid": 1, "picture": {"file": "small.png"}, "keyframes": {"move": [{**MOVE, "time": 0.7313}]}}
     scene["time"] = {"duration": 1, "fps": 12}
-    _, aims = stage_all(Scene(scene, folder), note=said.append)
+    aims = stage_all(Scene(scene, folder), note=said.append).aims
     assert abs(aims.keyframes[0].time - 0.7313) < 0.5 / 48 + 1e-9
     assert said == [f"a keyframe at 0.7313 s is met at {aims.keyframes[0].time:.6g} s, when a step ends"]
 

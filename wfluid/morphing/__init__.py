@@ -1,0 +1,1 @@
+"""Morphs: one picture flows into another."""

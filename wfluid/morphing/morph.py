@@ -1,0 +1,287 @@
+"""Morphs: one picture flows into another, through points of both (Bonilla & Velho, figure 7).
+
+    points = [((0.38, 0.25), (0.34, 0.34)), ((0.7, 0.3), (0.58, 0.39))]
+    morph_of_two = morph(read_picture("cat.png"), read_picture("raccoon.png"), points, duration=2.0)
+    write_animation("morph.gif", morph_of_two.frames(), fps=24)
+
+Keyframes take the points of the first picture a to those of the second, b, within the time of one flow. After
+a part of that time the first is seen through the flow's map to its start, the second through the map to its
+end: what corresponds lies at one place in both, and they are blended.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from wfluid.animation import Animation, Frame
+from wfluid.blur import blurred
+from wfluid.control.keyframes import ParticleKeyframe
+from wfluid.control.match import Match, match_keyframes
+from wfluid.control.search import Progress
+from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
+from wfluid.fluid import Fluid
+from wfluid.morphing.blending import blended, check_light
+from wfluid.morphing.pairing import Pair, paired
+from wfluid.morphing.passage import Passage, passage_of
+from wfluid.morphing.timing import DELAY, DELAY_LIMIT, EASE, Curve, curve_of, local
+from wfluid.painted import Painted
+from wfluid.paths import Place
+from wfluid.picture import Picture
+from wfluid.timeline import Timeline
+
+FLOW = Timeline(1.0, fps=24.0, substeps=2)
+"""The flow's own time: a morph's frames are at parts of it, however long the morph is shown."""
+
+VISCOSITY = 0.03
+"""Of a morph's fluid where none is given [longer side^2/s]: what lies around points goes with them, so that
+features keep their shape."""
+
+FACTORS = (0.5, 1.0, 0.35)
+"""On the radii of forces: the viscosity carries their motion wide enough."""
+
+TOLERANCE = 0.5 / 512
+"""Residual that is good enough for a morph [longer side]."""
+
+LEAST_JACOBIAN = 0.1
+"""Least det J that a timing mask may leave a map; a flow that leaves less is not to blame on it."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a morph goes.
+
+    Raises:
+        ValueError: no such curve or light, keys of a curve outside the duration, a delay outside 0 … 0.9.
+    """
+
+    timeline: Timeline
+    """When frames are shown; the first is the one picture, the last the other."""
+    warp_curve: str | Curve | Mapping[float, float] = EASE
+    """How far the flow is: "linear", "ease", or values 0 … 1 by time [s]."""
+    blend_curve: str | Curve | Mapping[float, float] = EASE
+    """How much of the second picture is seen, the same."""
+    blend: str = "linear"
+    """What is mixed: "linear" light, or "display" values."""
+    mask: Painted | None = None
+    """A mask, white where it happens first."""
+    delay: float = DELAY
+    """How much later it happens where the mask is black, a part of the time."""
+    reverse: bool = False
+    """From the second picture to the first: the same frames, the last one first."""
+    pingpong: bool = False
+    """There and back, without end: the frames between are shown again after the last."""
+
+    def __post_init__(self) -> None:
+        for name in ("warp_curve", "blend_curve"):
+            object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.end))
+        check_light(self.blend)
+        if not 0 <= self.delay <= DELAY_LIMIT:
+            raise ValueError(f"delay {self.delay}: expected a part of the time, 0 … {DELAY_LIMIT}")
+        if self.mask is not None and self.mask.values.max() > 1:
+            raise ValueError("a timing mask: expected values 0 … 1")
+
+    @property
+    def order(self) -> list[int]:
+        """The frames by their number from the first picture's on, in the order they are shown."""
+        frames = list(range(self.timeline.frames))
+        frames = frames[::-1] if self.reverse else frames
+        return frames + frames[-2:0:-1] if self.pingpong else frames
+
+
+@dataclass(frozen=True)
+class MorphFrame(Frame):
+    """A frame of a morph: `map` and `quality` are those of the first picture."""
+
+    to_map: CoordinateMap | None = None
+    """Where in the second picture, stretched over the frame, its colours come from."""
+    to_quality: MapQuality | None = None
+    """What that map does to the second picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class Morph:
+    """Two pictures on one flow; iterate over `frames()`."""
+
+    match: Match
+    """The flow's forces, and how near points of the first picture come to those of the second."""
+    pair: Pair
+    """The pictures; the first is the match's."""
+    course: Course
+    """How it goes."""
+    said: list[str] = field(default_factory=list)
+    """What was done to the mask that a user should know, once the first frame is there."""
+
+    @property
+    def animation(self) -> Animation:
+        """The flow, with the first picture."""
+        return self.match.animation
+
+    @property
+    def frame_count(self) -> int:
+        """Frames shown."""
+        return len(self.course.order)
+
+    @cached_property
+    def passage(self) -> Passage:
+        """The flow's maps."""
+        began, animation = time.perf_counter(), self.animation
+        found = passage_of(animation.solver, animation.forces, animation.timeline)
+        animation.seconds.simulate += time.perf_counter() - began
+        return found
+
+    @cached_property
+    def _ahead(self) -> np.ndarray | None:
+        """Where the warp happens first, on the grid: the mask, softened until no map of a frame folds."""
+        mask, grid = self.course.mask, self.animation.grid
+        if mask is None:
+            return None
+        painted, state = mask.on(grid), self.animation.solver.rest()
+        without = min(self._least_jacobian(None, state), LEAST_JACOBIAN)
+        sigma, ahead = 0.0, painted
+        while self._least_jacobian(ahead, state) < without and sigma < 1:
+            sigma = 2 * sigma or min(grid.hx, grid.hy)
+            ahead = blurred(painted, grid, sigma, self.passage.walls.periodic)
+        if sigma:
+            side = max(self.animation.picture.width, self.animation.picture.height)
+            text = f"the timing mask is softened by {sigma * side:.3g} px for the warp, which would fold"
+            self.said.append(text)
+        return ahead
+
+    def _least_jacobian(self, ahead: np.ndarray | None, state) -> float:
+        """The least det J of both maps over all frames."""
+        least = math.inf
+        for index in range(self.course.timeline.frames):
+            part = self._warped(index, ahead)
+            for warp in (self.passage.since_start(part), self.passage.until_end(part)):
+                self.animation.solver.set_map(state, warp.displacement)
+                least = min(least, measure_map(state, warp.walls).jacobian_min)
+        return least
+
+    def _part(self, index: int) -> float:
+        return index / (self.course.timeline.frames - 1)
+
+    def _warped(self, index: int, ahead: np.ndarray | None) -> np.ndarray:
+        """How far the flow is at a frame: one number, or (ny, nx)."""
+        part, course = self._part(index), self.course
+        return course.warp_curve.at(part if ahead is None else local(part, ahead, course.delay))
+
+    def frames(self) -> Iterator[MorphFrame]:
+        """The frames, in their order; the first picture's is the picture itself, and the second's."""
+        animation, course = self.animation, self.course
+        clock, solver, walls = time.perf_counter, animation.solver, animation.fluid.walls
+        shown = [animation.look_up(picture) for picture in (self.pair.a, self.pair.b)]
+        state, ahead, passage = solver.rest(), self._ahead, self.passage
+        mask = course.mask and course.mask.resampled(shown[0].width, shown[0].height)
+        for number, index in enumerate(course.order):
+            began = clock()
+            part = self._warped(index, ahead)
+            maps, qualities, pictures = (passage.since_start(part), passage.until_end(part)), [], []
+            lookup = 0.0
+            for warp, look_up in zip(maps, shown, strict=True):
+                solver.set_map(state, warp.displacement)
+                qualities.append(measure_map(state, walls))
+                looked = clock()
+                still = qualities[-1].displacement_max == 0
+                pictures.append(look_up.untouched if still else look_up.render(state.d_x, state.d_y))
+                lookup += clock() - looked
+            own = self._part(index)
+            weight = course.blend_curve.at(own if mask is None else local(own, mask, course.delay))
+            picture = blended(*pictures, weight, course.blend)
+            animation.seconds.lookup += lookup
+            animation.seconds.simulate += clock() - began - lookup
+            yield MorphFrame(
+                number,
+                number / course.timeline.fps,
+                picture,
+                maps[0],
+                qualities[0],
+                None,
+                to_map=maps[1],
+                to_quality=qualities[1],
+            )
+
+    def residuals_of_b(self) -> np.ndarray:
+        """How far from its point of the second picture each keyframe sees it at the start [px of it]."""
+        arrivals, animation = self.match.arrivals, self.animation
+        points = np.array([arrival.keyframe.point for arrival in arrivals])
+        wanted = np.array([arrival.keyframe.destination for arrival in arrivals])
+        left = self.passage.until_end(0.0).source_at(points) - wanted
+        grid = animation.grid
+        return np.linalg.norm(left * self.pair.window.pixels((grid.width, grid.height)), axis=1)
+
+    def inconsistency_px(self) -> tuple[float, float]:
+        """How far the two maps are from undoing one another, mean and greatest [px of the first picture]."""
+        picture = self.animation.picture
+        found = self.passage.inconsistency() * max(picture.width, picture.height)
+        return float(found.mean()), float(found.max())
+
+
+def morph(
+    a: Picture,
+    b: Picture,
+    points: Sequence[tuple[Place, Place]] | np.ndarray,
+    duration: float = 2.0,
+    fps: float = 24.0,
+    *,
+    fluid: Fluid | None = None,
+    pins: Sequence[Place] = (),
+    fit: str = "fill",
+    warp_curve: str | Mapping[float, float] = EASE,
+    blend_curve: str | Mapping[float, float] = EASE,
+    blend: str = "linear",
+    mask: Painted | None = None,
+    delay: float = DELAY,
+    reverse: bool = False,
+    pingpong: bool = False,
+    tolerance: float = TOLERANCE,
+    seed: int = 0,
+    progress: Callable[[Progress], object] = lambda progress: None,
+    **settings,
+) -> Morph:
+    """A morph of picture a into picture b, which searches for its flow (minutes on a large grid).
+
+    `points` are pairs of points that correspond, (n, 2, 2) or (n, 4): x, y in a [longer side of a] and x, y
+    in b [longer side of b]. `pins` are places of a that stay. The frames are as large as a, or as `settings`
+    say, which are those of `Animation`: cells, width, height, filter, edge, device. `fit` says how b covers
+    them ("fill", "fit" with bars, "stretch"), the others are those of `Course` and of `match_keyframes`.
+
+    Raises:
+        ValueError: no points, or not pairs of two numbers; points outside a, or outside what is seen of b;
+            what `Course`, `paired` and `match_keyframes` refuse.
+    """
+    course = Course(Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong)
+    pair = paired(a, b, fit)
+    fluid = Fluid(viscosity=VISCOSITY) if fluid is None else fluid
+    animation = Animation(a, fluid, [], FLOW, **settings)
+    extent, side = (animation.grid.width, animation.grid.height), max(b.width, b.height)
+    keyframes = [
+        ParticleKeyframe(start, pair.place((x * side, y * side), extent), FLOW.end)
+        for start, (x, y) in _pairs(points)
+    ]
+    found = match_keyframes(
+        animation, keyframes, pins=pins, tolerance=tolerance, seed=seed, progress=progress, factors=FACTORS
+    )
+    return Morph(found, pair, course)
+
+
+def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:
+    """Points that correspond.
+
+    Raises:
+        ValueError: other than pairs of places.
+    """
+    try:
+        rows = np.asarray(points, dtype=np.float64).reshape(len(points), -1)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            "points: expected x, y in the one picture and x, y in the other, for each"
+        ) from error
+    if not len(rows) or rows.shape[1] != 4:
+        raise ValueError("points: expected x, y in the one picture and x, y in the other, for at least one")
+    return [((x, y), (to_x, to_y)) for x, y, to_x, to_y in rows.tolist()]
