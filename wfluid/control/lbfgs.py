@@ -133,23 +133,11 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
-    """A minimisation between two iterations: all that it needs to go on as if it had never stopped."""
+class _AtPoint:
+    """Something that is at a point, with what the function is there."""
 
     point: Point
-    """Where it is."""
-    best: Point
-    """The lowest that it has seen, if only in a line search."""
-    steps: tuple[np.ndarray, ...]
-    """s of the pairs kept, the oldest first."""
-    differences: tuple[np.ndarray, ...]
-    """y of each."""
-    values: tuple[float, ...]
-    """f at the start and after each iteration."""
-    slopes: tuple[float, ...]
-    """Largest entry of the gradient, likewise."""
-    evaluations: int
-    """So many until here, of the start one."""
+    """Where it is: of what came of a minimisation where it converged, else the lowest point evaluated."""
 
     @property
     def x(self) -> np.ndarray:
@@ -166,6 +154,24 @@ class State:
         """Its gradient there."""
         return self.point.gradient
 
+
+@dataclass(frozen=True, eq=False)
+class State(_AtPoint):
+    """A minimisation between two iterations: all that it needs to go on as if it had never stopped."""
+
+    best: Point
+    """The lowest that it has seen, if only in a line search."""
+    steps: tuple[np.ndarray, ...]
+    """s of the pairs kept, the oldest first."""
+    differences: tuple[np.ndarray, ...]
+    """y of each."""
+    values: tuple[float, ...]
+    """f at the start and after each iteration."""
+    slopes: tuple[float, ...]
+    """Largest entry of the gradient, likewise."""
+    evaluations: int
+    """So many until here, of the start one."""
+
     @property
     def iteration(self) -> int:
         """How many are done."""
@@ -173,32 +179,15 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Minimum:
+class Minimum(_AtPoint):
     """What came of a minimisation."""
 
-    point: Point
-    """Where it converged, else the lowest point evaluated."""
     status: Status
     """Why it ended."""
     evaluations: int
     """So many in all, those of a line search cut short included."""
     state: State
     """After the last whole iteration: `minimise` goes on from it."""
-
-    @property
-    def x(self) -> np.ndarray:
-        """The lowest point."""
-        return self.point.x
-
-    @property
-    def value(self) -> float:
-        """f there."""
-        return self.point.value
-
-    @property
-    def gradient(self) -> np.ndarray:
-        """Its gradient there."""
-        return self.point.gradient
 
     @property
     def iterations(self) -> int:
