@@ -10,9 +10,15 @@ from pathlib import Path
 
 import pytest
 
+from wfluid import match_keyframes, read_scene
+from wfluid.staging import stage_all
+
 pytestmark = pytest.mark.beside
 
 ROOT = Path(__file__).parents[1]
+
+SCENES, SEARCHED = ROOT / "examples" / "scenes", ("keyframes", "morph")
+"""The scenes, and those whose forces were found by a search."""
 
 
 def load(name):
@@ -83,12 +89,22 @@ def test_every_scene_shows_its_control(device):
     made = example.animations(cells=64, width=32, device=device.alias)
     frames = {name: list(animation.frames()) for name, animation in made.items()}
     print(example.check(frames))
-    assert len(frames) == len(list((ROOT / "examples" / "scenes").glob("*.toml"))) >= 20
+    assert len(frames) == len(list(SCENES.glob("*.toml"))) - len(SEARCHED) >= 20
     assert made["layers"].layers and len(frames["layers"][-1].points) == 3
     with pytest.raises(AssertionError):
         example.check({"grow": frames["vortex"]})
     with pytest.raises(AssertionError):
         example.check({"vortex": frames["vortex"][:1]})
+
+
+@pytest.mark.parametrize("name", SEARCHED)
+def test_scenes_with_found_forces_need_no_search(device, name):
+    staged = stage_all(read_scene(SCENES / f"{name}.toml"), device.alias)
+    aims = staged.aims
+    match = match_keyframes(
+        staged.animation, aims.keyframes, pins=aims.pins, start=aims.found, tolerance=aims.tolerance
+    )
+    assert match.status == "reached" and match.evaluations == 0
 
 
 def test_the_scenes_reference_is_what_the_command_prints():

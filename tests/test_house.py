@@ -12,7 +12,10 @@ ROOT = Path(__file__).parents[1]
 ORDER = [
     "cells", "walls", "state", "multigrid", "linear", "impulses", "stages", "adjoint",
     "control/variables", "control/objectives", "control/recording", "control/functional",
-    "solver", "animation", "output", "report", "cli",
+    "solver", "animation",
+    "control/keyframes", "control/plan", "control/journey", "control/search", "control/match",
+    "morphing/blending", "morphing/pairing", "morphing/timing", "morphing/passage", "morphing/morph",
+    "output", "report", "cli",
 ]  # fmt: skip
 
 

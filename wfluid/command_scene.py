@@ -248,7 +248,7 @@ def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
     morphs = options.verb == "morph"
     if not (options.move or options.points):
         form = "X0,Y0:X1,Y1" + ("" if morphs else "[@T]")
-        raise ValueError(f"where to? give --points FILE.csv, or at least one --move {form}")
+        raise ValueError(f"where to? give at least one --move {form}, or --points FILE.csv")
     moves = [parse_move(text) for text in options.move]
     names = [f"--move {text}" for text in options.move]
     for row in read_points(options.points) if options.points else ():
