@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from wfluid import match_keyframes, read_scene
+from wfluid import Morph, Timeline, match_keyframes, read_scene
+from wfluid.morphing.morph import Course
 from wfluid.staging import stage_all
 
 pytestmark = pytest.mark.beside
@@ -95,6 +96,25 @@ def test_every_scene_shows_its_control(device):
         example.check({"grow": frames["vortex"]})
     with pytest.raises(AssertionError):
         example.check({"vortex": frames["vortex"][:1]})
+
+
+def test_the_morphs_check_holds(device):
+    """The scene's forces on its grid; frames in another order, or too few, or a search cut short fail."""
+    example, scene = load("morph"), stage_all(read_scene(SCENES / "morph.toml"), device.alias)
+    aims = scene.aims
+    match = match_keyframes(scene.animation, aims.keyframes, start=aims.found, tolerance=aims.tolerance)
+    made = Morph(match, scene.pair, Course(Timeline(0.5, 24)))
+    frames = list(made.frames())
+    print(example.check(made, frames))
+    with pytest.raises(AssertionError):
+        example.check(made, frames[::-1])
+    with pytest.raises(AssertionError):
+        example.check(made, frames[:-1])
+    short = example.morphing(cells=32, seconds=0.25, device=device.alias, progress=lambda at: True)
+    shown = list(short.frames())
+    assert len(shown) == 7
+    with pytest.raises(AssertionError):
+        example.check(short, shown)
 
 
 @pytest.mark.parametrize("name", SEARCHED)
