@@ -66,9 +66,7 @@ def rotated(point, angle):
     return 0.5 + c * x - s * y, 0.5 + s * x + c * y
 
 
-RING = [
-    (0.5 + r * np.cos(a + r), 0.5 + r * np.sin(a + r)) for r in (0.1, 0.22) for a in np.pi / 2 * np.arange(4)
-]
+RING = [(0.5 + 0.16 * np.cos(a), 0.5 + 0.16 * np.sin(a)) for a in np.pi / 2 * np.arange(4) + 0.3]
 """Points that are turned."""
 
 LINEAR = {"warp_curve": "linear", "blend_curve": "linear"}
@@ -97,7 +95,7 @@ def searched(name, device):
             **LINEAR,
         )
     points = [(point, rotated(point, ANGLE)) for point in RING]
-    return morph(round_picture(), round_picture(ANGLE), points, 1.0, 4, cells=48, device=device, **LINEAR)
+    return morph(round_picture(), round_picture(ANGLE), points, 1.0, 4, cells=40, device=device, **LINEAR)
 
 
 def going(found, **course):
