@@ -238,6 +238,8 @@ def test_a_sharp_mask_is_softened_for_the_warp_and_that_is_said(morph_of):
     assert found.said[0].startswith("the timing mask is softened by ") and "px for the warp" in found.said[0]
     least = min(min(f.quality.jacobian_min, f.to_quality.jacobian_min) for f in frames)
     assert least >= LEAST_JACOBIAN, least
+    above, below = (np.abs(one.displacement) for one in (frames[3].to_map, frames[3].map))
+    assert above[:4].max() < 0.2 * above[-4:].max() and below[-4:].max() < 0.2 * below[:4].max()
     sharp = found.passage.since_start(np.repeat((np.arange(32) < 16)[:, None], 48, axis=1).astype(float))
     slopes = np.diff(sharp.source_of[..., 1], axis=0) * 48
     assert slopes.min() < 0, "the sharp one does not fold: the test would say nothing"
