@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,13 @@ def test_every_public_name_exists_and_is_documented(name):
         for attribute, value in vars(thing).items():
             if not attribute.startswith("_") and inspect.isfunction(value):
                 assert inspect.getdoc(value), f"{name}.{attribute} has no docstring"
+
+
+def test_every_package_is_installed():
+    """A folder of modules that pyproject.toml does not name is missing from the wheel."""
+    named = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    folders = {f"wfluid.{path.parent.name}" for path in ROOT.glob("wfluid/*/__init__.py")}
+    assert set(named) == {"wfluid", "wfluid.kernels", *folders}
 
 
 def test_unknown_names_are_an_attribute_error():

@@ -149,8 +149,11 @@ class _Stage:
             if key in self.morph
         }
         for key in ("warp_curve", "blend_curve"):
-            if not isinstance(given.get(key, ""), str):
-                given[key] = dict(given[key])
+            keys = given.get(key, "")
+            if not isinstance(keys, str):
+                given[key] = dict(keys)
+                if len(given[key]) < len(keys):
+                    raise ValueError(f"{key}: two keys have one time")
         if "timing" in self.morph:
             name = self.morph["timing"]
             given["mask"] = named(name, lambda: Painted(self.paintings.paint(name)))

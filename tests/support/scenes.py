@@ -82,8 +82,25 @@ def scenes(draw):
     """Tables of a valid scene, whose names fit together."""
     found = draw(SCENES)
     found.setdefault("picture", {"file": "a.png"})
+    found = of_morph(found) if "morph" in found else found
     found = {name: found[name] for name in draw(st.permutations(sorted(found)))}
     return named(found, lambda names: draw(st.sampled_from(names)))
+
+
+def of_morph(scene):
+    """The tables that a morph has a use for, with a point of both pictures."""
+    found = less(scene, "force", "group", "density", "layer", "tracks", "effect")
+    keyframes = less(found.get("keyframes", {}), "time")
+    moves = keyframes.get("move") or [{"from": [1, 2], "to": [3, 4]}]
+    found["keyframes"] = {**keyframes, "move": [less(move, "time") for move in moves]}
+    if "time" in found:
+        found["time"] = less(found["time"], "substeps", "loop")
+    return found
+
+
+def less(table, *names):
+    """A table without some of its keys."""
+    return {name: value for name, value in table.items() if name not in names}
 
 
 def named(scene, choose):
@@ -100,11 +117,12 @@ def named(scene, choose):
     users = [*scene.get("force", []), *scene.get("group", [])]
     users += [source for density in scene.get("density", []) for source in density.get("source", [])]
     envelopes = [[name] for name in scene.get("envelopes", {})]
+    shown = [name for name in SHOWN if name != "tracks" or "morph" not in scene]
     for tables_, key, known in (
         (users, "envelope", envelopes),
         (scene.get("force", []), "group", groups),
         (scene.get("force", []), "density", densities),
-        (scene.get("output", []), "of", [*SHOWN, *layers, *densities]),
+        (scene.get("output", []), "of", [*shown, *layers, *densities]),
     ):
         for table in tables_:
             if key in table and known:

@@ -29,8 +29,10 @@ FORCE_NAMES = {
     (heading, name) for heading, name in KEYS if name == "name" and heading.startswith("[[force]]")
 }
 KEYFRAMES = {key for key in KEYS if "keyframes" in key[0]}
-ELSEWHERE = {("at the top", "wfluid")} | FORCE_NAMES | {key for key in KEYS if key[0] == OUTPUT} | KEYFRAMES
-"""Keys that do not change a staged animation: tests below, and of keyframe scenes, are about them."""
+MORPH = {key for key in KEYS if key[0] == "[morph]"}
+OUTPUTS = {key for key in KEYS if key[0] == OUTPUT}
+ELSEWHERE = {("at the top", "wfluid")} | FORCE_NAMES | OUTPUTS | KEYFRAMES | MORPH
+"""Keys that do not change a staged animation: tests below, and of keyframes and morphs, are about them."""
 
 SETTINGS = {(heading, name): table.keys[name] for heading, _, table in tables() for name in table.keys}
 

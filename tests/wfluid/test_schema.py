@@ -8,14 +8,18 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from scenes import KEYS, VALUES, WRONG, changed, full, keys_of, named, parts, scenes, takes
+from scenes import KEYS, VALUES, WRONG, changed, full, keys_of, less, named, of_morph, parts, scenes, takes
 
+from wfluid.morphing.timing import CURVES
 from wfluid.scene import Scene, SceneError, read_scene, write_scene
 from wfluid.scene_format import SCENE, reference, tables
 from wfluid.schema import Key, Many, Named, SchemaError, Table, Variants, checked
 
-EVERYTHING = named(full(), lambda names: names[-1])
-"""A scene with every key of every table, and a table of every kind."""
+EVERYTHING = named(less(full(), "morph"), lambda names: names[-1])
+"""A scene with every key of every table, and a table of every kind, but for a morph's."""
+
+MORPH = named(of_morph(full()), lambda names: names[-1])
+"""A scene with every key that goes with a morph."""
 
 ANY = settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow])
 
@@ -31,7 +35,7 @@ def test_the_scene_with_everything_has_every_key():
     """What the other tests walk over leaves nothing out."""
     headings = {id(table): heading for heading, _, table in tables()}
     found = set()
-    for _, what, value in parts(SCENE, EVERYTHING):
+    for _, what, value in [*parts(SCENE, EVERYTHING), *parts(SCENE, MORPH)]:
         table = what.tables[value["kind"]] if isinstance(what, Variants) else what
         if isinstance(table, Table):
             names = [name for name in value if isinstance(table.keys.get(name), Key)]
@@ -42,6 +46,7 @@ def test_the_scene_with_everything_has_every_key():
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_what_the_schema_allows_is_kept_as_it_is(scene):
     assert checked(SCENE, scene) == scene
     assert Scene(scene).tables == scene
@@ -50,6 +55,7 @@ def test_what_the_schema_allows_is_kept_as_it_is(scene):
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_a_scene_that_is_written_reads_back_the_same(scene):
     """Its values and their types, its names, and the files that it means."""
     with tempfile.TemporaryDirectory() as folder:
@@ -72,6 +78,7 @@ def scene_in_order(value, like):
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_a_scene_written_to_another_folder_means_the_same_files(scene):
     """Only names of files change: they lead from where the scene is now to where they led before."""
     with tempfile.TemporaryDirectory() as folder:
@@ -96,6 +103,7 @@ def written(scene):
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_a_required_key_that_is_missing_is_named(scene):
     """With what it is for, and the path of its table."""
     for path, what, value in parts(SCENE, scene):
@@ -105,13 +113,10 @@ def test_a_required_key_that_is_missing_is_named(scene):
                 assert (error.path, error.reason) == (path, f"{name} is missing: {key.meaning}")
 
 
-def less(table, name):
-    return {key: value for key, value in table.items() if key != name}
-
-
 @ANY
 @given(scenes(), st.sampled_from(["no_such_key", "Start", "fiel", "kinds", "é", ""]))
 @example(EVERYTHING, "xyzzy")
+@example(MORPH, "xyzzy")
 def test_a_key_that_does_not_exist_is_named(scene, name):
     for path, what, _ in parts(SCENE, scene):
         if isinstance(what, Table | Variants):
@@ -122,6 +127,7 @@ def test_a_key_that_does_not_exist_is_named(scene, name):
 @ANY
 @given(scenes(), st.integers(0, len(WRONG)))
 @example(EVERYTHING, 0)
+@example(MORPH, 0)
 def test_a_value_of_a_wrong_type_or_range_is_named(scene, turn):
     """The message has the value and what was expected."""
     for n, (path, key, _) in enumerate(parts(SCENE, scene)):
@@ -146,6 +152,10 @@ def fits(kind, value):
     if kind == "a name or a list of names":
         items = value if isinstance(value, list) else [value]
         return items != [] and all(isinstance(item, str) and item for item in items)
+    if kind == "a word or keys":
+        return value in CURVES or (
+            isinstance(value, list) and value != [] and all(of_count(r, 2) for r in value)
+        )
     if kind.startswith("a colour"):
         return isinstance(value, str) and re.fullmatch("#[0-9a-fA-F]{6}", value) is not None
     if of_numbers := re.fullmatch("a (whole )?number(?: from (.*?))?(?: above (.*?))?(?: to (.*?))?", kind):
@@ -185,6 +195,7 @@ def test_a_key_takes_what_its_type_says_and_nothing_else(heading, name):
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_a_table_that_is_none_is_named(scene):
     """A value where a table belongs, one table where a list belongs, a list where one table belongs."""
     for path, what, _ in parts(SCENE, scene):
@@ -198,6 +209,7 @@ def test_a_table_that_is_none_is_named(scene):
 @ANY
 @given(scenes())
 @example(EVERYTHING)
+@example(MORPH)
 def test_two_of_one_name_are_refused(scene):
     """Where each has its name, whatever else it says."""
     for path, what, value in parts(SCENE, scene):
