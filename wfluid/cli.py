@@ -206,7 +206,7 @@ def _add_morph(verbs) -> None:
     add("--move", **_repeated("X0,Y0:X1,Y1", "the point X0,Y0 of A is X1,Y1 of B [px]"))
     add("--pin", **_repeated("X,Y", "this point of A should stay [px]"))
     add("--fit", help="how B covers A's frame: fill, fit (with bars) or stretch (fill)")
-    add("--warp-curve", help="how far the flow is: linear, ease, or keys S:PART,… of 0 … 1 (ease)")
+    add("--warp-curve", help="how far points are on their ways: linear, ease, or keys S:PART,… (ease)")
     add("--blend-curve", help="how much of B is seen, the same (ease)")
     add("--blend", help="what is mixed: linear light, or display values (linear)")
     add(

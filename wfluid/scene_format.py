@@ -431,7 +431,7 @@ SCENE = Table(
                 ),
                 "fit": Key("how it covers the frame", **word(*FITS), default="fill"),
                 "warp_curve": Key(
-                    "how far the flow is over time: linear, ease, or [[s, 0 … 1], …]",
+                    "how far points are on their ways: linear, ease, or [[s, 0 … 1], …]",
                     _curve,
                     "a word or keys",
                     default="ease",

@@ -88,21 +88,9 @@ def test_points_arrive_in_both_pictures_and_nothing_folds(morph_of, name):
             assert 0.5 < quality.jacobian_min <= 1 <= quality.jacobian_max < 2
 
 
-def half_way(found, turned=False):
-    """The part of the flow's time after which followed points are half way, read off their tracks."""
-    tracks = found.match.tracks
-    ways = np.linalg.norm(tracks - tracks[0], axis=2)
-    if turned:
-        angles = np.arctan2(*np.moveaxis(tracks - 0.5, 2, 0)[::-1])
-        ways = np.abs(np.angle(np.exp(1j * (angles - angles[0]))))
-    done = (ways / ways[-1]).mean(axis=1)
-    return float(np.interp(0.5, done, np.linspace(0, 1, len(done))))
-
-
-def middle(found, part):
-    """The frame half way in time, with the flow after a part of its own."""
-    end = found.course.timeline.end
-    frames = list(going(found, warp_curve={end / 2: part}).frames())
+def middle(found):
+    """The frame in which points are half way: curves are linear."""
+    frames = list(found.frames())
     return frames[len(frames) // 2].picture.pixels
 
 
@@ -113,7 +101,7 @@ def test_between_a_picture_and_its_copy_shifted_is_the_picture_half_shifted(morp
     0.02 px of a slope of 0.05 / px err by 1e-3, which is 60 dB.
     """
     found = morph_of("shift")
-    got, wanted = middle(found, half_way(found)), waves((SHIFT[0] / 2, SHIFT[1] / 2)).pixels
+    got, wanted = middle(found), waves((SHIFT[0] / 2, SHIFT[1] / 2)).pixels
     dissolve = (waves().pixels + waves(SHIFT).pixels) / 2
     assert psnr(got, wanted) > 55, psnr(got, wanted)
     assert psnr(dissolve, wanted) < 20
@@ -122,7 +110,7 @@ def test_between_a_picture_and_its_copy_shifted_is_the_picture_half_shifted(morp
 def test_between_a_picture_and_its_copy_turned_is_the_picture_half_turned(morph_of):
     """Stripes of 13 px, moved by up to half of that: a cross-dissolve shows two, a morph the one."""
     found = morph_of("turn")
-    got, wanted = middle(found, half_way(found, turned=True)), round_picture(ANGLE / 2).pixels
+    got, wanted = middle(found), round_picture(ANGLE / 2).pixels
     dissolve = (round_picture().pixels + round_picture(ANGLE).pixels) / 2
     assert psnr(got, wanted) > psnr(dissolve, wanted) + 8, (psnr(got, wanted), psnr(dissolve, wanted))
     np.testing.assert_allclose(found.match.tracks[-1], [rotated(point, ANGLE) for point in RING], atol=2e-3)
@@ -148,10 +136,8 @@ def test_what_corresponds_lies_at_one_place_in_both_warped_pictures(morph_of):
     for weight in (0.0, 1.0):
         keys = {(n + 1) / (count - 1) * end: weight for n in range(count - 2)}
         alone.append(list(going(found, blend_curve=keys).frames()))
-    steps = found.match.tracks.shape[0] - 1
     for index in range(1, count - 1):
-        places = found.match.tracks[index * steps // (count - 1)]
-        for place in places:
+        for place in alone[0][index].points:
             one, other = (centroid(frames[index].picture, place) for frames in alone)
             assert np.linalg.norm(one - SIDE * place) < 0.3, (index, one, SIDE * place)
             assert np.linalg.norm(other - one) < 2 * SIDE * TOLERANCE, (index, one, other)
@@ -162,11 +148,25 @@ def test_what_corresponds_lies_at_one_place_in_both_warped_pictures(morph_of):
 def test_maps_of_a_frame_lead_from_it_to_both_pictures(morph_of):
     """From where a followed point is, `map` leads to its point of A and `to_map` to that of B."""
     found = morph_of("dots")
-    steps, starts, ends = found.match.tracks.shape[0] - 1, *np.swapaxes(POINTS, 0, 1)
+    starts, ends = np.swapaxes(POINTS, 0, 1)
     for frame in found.frames():
-        here = found.match.tracks[frame.index * steps // (found.frame_count - 1)]
+        here = frame.points
         np.testing.assert_allclose(frame.map.source_at(here), starts, atol=TOLERANCE)
         np.testing.assert_allclose(frame.to_map.source_at(here), ends, atol=2 * TOLERANCE)
+
+
+def test_with_a_linear_curve_points_go_evenly(morph_of):
+    """All together, as far from frame to frame; soft starts and stops are the other curve's."""
+    found = morph_of("dots")
+    steps = [
+        np.linalg.norm(np.diff([frame.points for frame in one.frames()], axis=0), axis=2).sum(axis=1)
+        for one in (found, going(found, warp_curve="ease"))
+    ]
+    assert np.ptp(steps[0]) < 0.02 * steps[0].mean(), steps[0]
+    assert steps[1][0] < 0.5 * steps[0][0] and steps[1].max() > 1.3 * steps[0].max()
+    first, *_, last = found.frames()
+    np.testing.assert_allclose(first.points, [start for start, _ in POINTS], atol=1e-7)
+    np.testing.assert_allclose(last.points, [to for _, to in POINTS], atol=TOLERANCE)
 
 
 def test_a_picture_that_becomes_itself_is_still(device_name):
@@ -192,13 +192,13 @@ def test_the_blend_follows_its_curve_and_its_light(morph_of):
 
 
 def test_the_warp_follows_its_curve(morph_of):
-    """A frame's maps are the passage's after the curve's value, whatever the blend does."""
+    """Points have the curve's value of their nearly straight ways behind them, whatever the blend does."""
     found = going(morph_of("dots"), warp_curve={0.25: 0.8}, blend_curve="ease")
-    for frame, part in zip(
-        found.frames(), np.interp(np.linspace(0, 1, 7), [0, 0.5, 1], [0, 0.8, 1]), strict=True
-    ):
-        np.testing.assert_array_equal(frame.map.displacement, found.passage.since_start(part).displacement)
-        np.testing.assert_array_equal(frame.to_map.displacement, found.passage.until_end(part).displacement)
+    starts, ends = np.swapaxes(POINTS, 0, 1)
+    values = np.interp(np.linspace(0, 1, 7), [0, 0.5, 1], [0, 0.8, 1])
+    for frame, value in zip(found.frames(), values, strict=True):
+        way = np.linalg.norm(frame.points - starts, axis=1).sum()
+        assert way == pytest.approx(value * np.linalg.norm(ends - starts, axis=1).sum(), abs=2e-3)
 
 
 # A mask

@@ -310,7 +310,7 @@ CSV = {
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "where to? give --points FILE.csv, or at least one --move X0,Y0:X1,Y1"),
+        ((), "where to? give at least one --move X0,Y0:X1,Y1, or --points FILE.csv"),
         (("--points", "three.csv"), "three.csv:2: 3 columns; expected from x, from y, to x, to y"),
         (("--points", "far.csv"), "90,20: outside the picture of 60 x 40 pixels"),
         (("--points", "beyond.csv"), "the point 26,90 of the second picture lies outside it, 60 x 40"),

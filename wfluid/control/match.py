@@ -169,7 +169,9 @@ def match_keyframes(
     captured: dict[Grid, Functional] = {}
     for factor, before in tries:
         matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, captured)
-        if before and (best := _measured(matcher, False, log, began)).status == REACHED:
+        if (before or _all_stay(particles)) and (
+            best := _measured(matcher, False, log, began)
+        ).status == REACHED:
             break  # they do it as they are
         try:
             matcher.run()
@@ -196,6 +198,11 @@ def _seconds(log: Log, began: float) -> dict[str, float]:
         "optimiser": total - spent.forward - spent.backward,
         "total": total,
     }
+
+
+def _all_stay(particles: Sequence[Particle]) -> bool:
+    """Whether every point should stay where it is."""
+    return all(np.all(particle.destinations == particle.point) for particle in particles)
 
 
 def _rank(match: Match) -> tuple[bool, float]:

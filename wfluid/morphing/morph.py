@@ -63,7 +63,7 @@ class Course:
     timeline: Timeline
     """When frames are shown; the first is the one picture, the last the other."""
     warp_curve: str | Curve | Mapping[float, float] = EASE
-    """How far the flow is: "linear", "ease", or values 0 … 1 by time [s]."""
+    """How far points are on their ways: "linear", "ease", or values 0 … 1 by time [s]."""
     blend_curve: str | Curve | Mapping[float, float] = EASE
     """How much of the second picture is seen, the same."""
     blend: str = "linear"
@@ -96,7 +96,10 @@ class Course:
 
 @dataclass(frozen=True)
 class MorphFrame(Frame):
-    """A frame of a morph: `map` and `quality` are those of the first picture."""
+    """A frame of a morph: `map` and `quality` are those of the first picture.
+
+    `points` are the keyframes' points, but with a timing mask, by which they have no one place.
+    """
 
     to_map: CoordinateMap | None = None
     """Where in the second picture, stretched over the frame, its colours come from."""
@@ -167,9 +170,26 @@ class Morph:
         return index / (self.course.timeline.frames - 1)
 
     def _warped(self, index: int, ahead: np.ndarray | None) -> np.ndarray:
-        """How far the flow is at a frame: one number, or (ny, nx)."""
+        """The part of the flow's time that a frame shows: one number, or (ny, nx)."""
         part, course = self._part(index), self.course
-        return course.warp_curve.at(part if ahead is None else local(part, ahead, course.delay))
+        far = course.warp_curve.at(part if ahead is None else local(part, ahead, course.delay))
+        return np.interp(far, self._ways, np.linspace(0.0, 1.0, len(self._ways)))
+
+    @cached_property
+    def _ways(self) -> np.ndarray:
+        """The part of their ways, all together, that points have behind them after each step, 0 … 1."""
+        steps = np.linalg.norm(np.diff(self.match.tracks, axis=0), axis=2).sum(axis=1)
+        if not steps.any():
+            steps[:] = 1.0
+        far = np.cumsum(steps)
+        return np.append(0.0, far / far[-1])
+
+    def _points(self, part: float) -> np.ndarray:
+        """Where the keyframes' points are after a part of the flow's time [longer side], (n, 2)."""
+        tracks = self.match.tracks
+        at = part * (len(tracks) - 1)
+        step = min(int(at), len(tracks) - 2)
+        return tracks[step] + (at - step) * (tracks[step + 1] - tracks[step])
 
     def frames(self) -> Iterator[MorphFrame]:
         """The frames, in their order; the first picture's is the picture itself, and the second's."""
@@ -202,6 +222,7 @@ class Morph:
                 maps[0],
                 qualities[0],
                 None,
+                points=self._points(float(part)) if mask is None else np.empty((0, 2)),
                 to_map=maps[1],
                 to_quality=qualities[1],
             )
@@ -277,7 +298,7 @@ def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:
         ValueError: other than pairs of places.
     """
     try:
-        rows = np.asarray(points, dtype=np.float64).reshape(len(points), -1)
+        rows = np.asarray(points, dtype=np.float64).reshape(max(1, len(points)), -1)
     except (TypeError, ValueError) as error:
         raise ValueError(
             "points: expected x, y in the one picture and x, y in the other, for each"
