@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -120,6 +121,7 @@ def run_scene(scene: Scene, how: Run) -> int:
             write_scene(how.save_scene, with_found(sized, match.found, aims.side))
         if how.plot:
             plot_match(match, how.plot)
+    least = math.inf
     if scene.outputs:
         report = Report(animation, match, aims.side if aims else 1.0, morph)
         writing = _write_frames(morph or animation, writers, report, how.quiet)
@@ -130,7 +132,11 @@ def run_scene(scene: Scene, how: Run) -> int:
         for output in scene.outputs:
             if output.of == "report":
                 write_report(output.file, report.as_dict(times))
-    return _judge_match(match, aims.side) if match else 0
+        least = min(least, report.of_b[0])
+    if not match:
+        return 0
+    folds = _judge_folds(min(least, match.jacobian[0]))
+    return _judge_match(match, aims.side, course) or folds
 
 
 def _with_sizes(scene: Scene, picture: Picture, pair: Pair | None) -> Scene:
@@ -178,7 +184,7 @@ def _matched(animation: Animation, aims: Aims, how: Run, factors: Sequence[float
             show(at)
             return interrupt.wanted
 
-        return match_keyframes(
+        match = match_keyframes(
             animation,
             aims.keyframes,
             pins=aims.pins,
@@ -189,18 +195,33 @@ def _matched(animation: Animation, aims: Aims, how: Run, factors: Sequence[float
             side=aims.side,
             factors=factors,
         )
+        if interrupt.wanted:
+            if not how.quiet:
+                print("\nstopped: writing the best so far; Ctrl-C again ends that too", file=sys.stderr)
+            match = replace(match, status=STOPPED)
+        return match
 
 
-def _judge_match(match: Match, side: float) -> int:
-    """Say which points are not where they should be; the exit code."""
+def _judge_match(match: Match, side: float, course: Course | None) -> int:
+    """Say which points are not where they should be; the exit code. All of a morph's are due at its end."""
     if match.status == REACHED:
         return 0
-    worst = match.residual * side
-    print(f"wfluid: {match.status}: the farthest point is {worst:.3g} px from its keyframe", file=sys.stderr)
+    worst, allowed = (f"{length * side:.3g} px" for length in (match.residual, match.tolerance))
+    text = f"the farthest point is {worst} from its keyframe, {allowed} are allowed"
+    print(f"wfluid: {match.status}: {text}", file=sys.stderr)
     for arrival in match.arrivals:
         if arrival.residual > match.tolerance:
-            print(f"wfluid: {arrival.said(side)}", file=sys.stderr)
+            print(f"wfluid: {arrival.said(side, timed=course is None)}", file=sys.stderr)
     return EXIT_INTERRUPTED if match.status == STOPPED else EXIT_FAILED
+
+
+def _judge_folds(least: float) -> int:
+    """Say whether a map folds, whose least det J is given; the exit code."""
+    if least > 0:
+        return 0
+    advice = "leave out points that pass close by one another, or use more cells"
+    print(f"wfluid: the picture folds over itself (det J {least:.2g}); {advice}", file=sys.stderr)
+    return EXIT_FAILED
 
 
 def _kept_frames(outputs: Sequence[Output]) -> int:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -221,9 +222,10 @@ class Scene:
             SceneError: a length or a rate that makes no sense.
         """
         time = self.tables.get("time", {})
-        duration = time.get("duration", self._last_keyframe or 2.0)
+        fps, latest = time.get("fps", 15.0), self._last_keyframe
+        until = math.ceil(latest * fps - 1e-6) / fps if latest else 2.0  # no frame falls short of it
         try:
-            return Timeline(duration, time.get("fps", 15.0), time.get("substeps"))
+            return Timeline(time.get("duration", until), fps, time.get("substeps"))
         except ValueError as error:
             raise self.error(SchemaError(("time",), str(error))) from None
 

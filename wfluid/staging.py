@@ -92,7 +92,7 @@ class _Stage:
         self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
         self.paintings = Paintings(self.picture, scene.folder, note)
         self.drawing = self._drawing()
-        self.pair = _at(("morph",), self._pair) if self.morph else None
+        self.pair = _at(("morph", "to"), self._pair) if self.morph else None
         self.course = _at(("morph",), self._course) if self.morph else None
         self.aims = _at(("keyframes",), self._aims) if "keyframes" in self.tables else None
 

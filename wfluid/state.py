@@ -141,4 +141,5 @@ class State:
     @property
     def points(self) -> np.ndarray:
         """Where the points are now [longer side]: (points, 2), x and y, a copy."""
-        return np.stack([self.p_x.numpy() * self.grid.hx, self.p_y.numpy() * self.grid.hy], axis=1)
+        columns = [p.numpy().astype(np.float64) for p in self.particles]
+        return np.stack(columns, axis=1) * (self.grid.hx, self.grid.hy)

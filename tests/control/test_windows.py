@@ -22,7 +22,7 @@ from control_cases import (
     paint,
 )
 
-from wfluid import Constant, Fluid, Free, Freeze, Functional, GaussianForce, Growth, Keyed, State
+from wfluid import Constant, Fluid, Free, Freeze, Functional, GaussianForce, Grid, Growth, Keyed, State
 from wfluid.control.objectives import DensityMisfit, Effort, ParticleMisfit
 
 LATE = [
@@ -173,6 +173,20 @@ def test_a_state_given_out_stays_as_it_is_when_the_run_is_done_again(make):
     functional.value(2 * functional.start)
     for got, wanted in zip(fields(state), kept, strict=True):
         np.testing.assert_array_equal(got, wanted)
+
+
+@pytest.mark.parametrize("size", [(600, 400), (480, 320), (400, 600)])
+def test_a_point_on_an_edge_may_be_gone_on_from(device, size):
+    """Single precision may leave it outside by its rounding."""
+    grid, fluid = Grid.for_picture(*size, 48), Fluid(viscosity=0.01)
+    points = [(0.5 * grid.width, grid.height), (grid.width, 0.4 * grid.height)]
+    one = Functional(
+        grid, fluid, [PUSH], TIMELINE, ParticleMisfit(points, points, MIDDLE), [FREE], end=MIDDLE
+    )
+    middle = one.state_after(one.start)
+    misfit = ParticleMisfit(middle.points, points, END)
+    two = Functional(grid, fluid, [PUSH], TIMELINE, misfit, [FREE], begin=(MIDDLE, middle))
+    assert np.isfinite(two.value(two.start))
 
 
 STRETCHES = {

@@ -1,13 +1,16 @@
 """Morphs in scenes and on the command line: what each key says, what is written, said and refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from morph_cases import centroid, dots, psnr
 from scenes import KEYS, write_pictures
 
+import wfluid.render
 from wfluid.cli import main
+from wfluid.control.match import match_keyframes
 from wfluid.morphing.morph import FLOW, TOLERANCE, VISCOSITY
 from wfluid.picture import Picture, read_picture, write_picture
 from wfluid.scene import Scene, SceneError, read_scene
@@ -407,3 +410,30 @@ def test_tiny_and_huge_pictures_become_one_another(folder, capsys, sizes, move, 
     np.testing.assert_allclose(frames[0], 0.25, atol=0.01)
     row = frames[-1][len(frames[-1]) // 2]
     np.testing.assert_allclose(row[row.shape[0] // 2] if fit == "fit" else frames[-1], 0.75, atol=0.03)
+
+
+def test_a_picture_that_folds_is_written_and_said(folder, capsys, monkeypatch):
+    """Though its points are where they should be: exit code 1."""
+
+    def folded(*arguments, **settings):
+        match = match_keyframes(*arguments, **settings)
+        assert match.status == "reached" and match.jacobian[0] > 0
+        return replace(match, jacobian=(-0.5, 3.0))
+
+    words = [
+        "morph",
+        "from.png",
+        "to.png",
+        "--points",
+        "points.csv",
+        "-o",
+        "f.gif",
+        *QUICK,
+        "--tolerance",
+        "2",
+    ]
+    assert main(words) == 0
+    monkeypatch.setattr(wfluid.render, "match_keyframes", folded)
+    assert main(words) == 1
+    assert "the picture folds over itself (det J -0.5)" in capsys.readouterr().err
+    assert (folder / "f.gif").exists()

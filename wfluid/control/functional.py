@@ -49,6 +49,10 @@ JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Most that conjugate gradients may leave undone of a solve."""
 
 
+ROUNDING = 1e-6
+"""How far outside a point on an edge may be that a run has left there [longer side]."""
+
+
 @dataclass
 class Seconds:
     """Where the time of evaluations went [s]."""
@@ -146,10 +150,11 @@ class Functional:
             elif not isinstance(term, Effort):
                 raise TypeError(f"{type(term).__name__} is no objective that a run has")
         points = np.concatenate([np.empty((0, 2)), *(particles_of(term) for _, term in terms_of(objective))])
-        if not np.all((points >= 0) & (points <= (grid.width, grid.height))):
+        inside = np.clip(points, 0.0, (grid.width, grid.height))
+        if not np.all(np.abs(points - inside) <= ROUNDING):
             raise ValueError("an objective's particles must begin within the picture")
         self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
-        stretch = Stretch(self._first, self._last, begun, points)
+        stretch = Stretch(self._first, self._last, begun, inside)
         if before and not (terms or of_viscosity or memory_mb) and before.suits(setup, stretch, effort):
             before.moved(setup, stretch)
             self._recording = before

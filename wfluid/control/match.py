@@ -76,13 +76,14 @@ class Arrival:
         missed = math.dist(self.particle, self.keyframe.destination)
         return max(missed, math.dist(self.source, self.keyframe.point))
 
-    def said(self, side: float) -> str:
-        """It in a line, in pixels of a picture whose longer side is `side`."""
+    def said(self, side: float, timed: bool = True) -> str:
+        """It in a line, in pixels of a picture whose longer side is `side`; with its time, if wanted."""
         (x, y), (to_x, to_y) = self.keyframe.point, self.keyframe.destination
         way = f"{x * side:g},{y * side:g}"
         way = f"the pin {way}" if self.pinned else f"{way} to {to_x * side:g},{to_y * side:g}"
         why = f": {self.reason}" if self.reason else ""
-        return f"{way} at {self.keyframe.time:g} s: {self.residual * side:.3g} px away{why}"
+        when = f" at {self.keyframe.time:g} s" if timed else ""
+        return f"{way}{when}: {self.residual * side:.3g} px away{why}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,7 +68,7 @@ class Course:
     """How much of the second picture is seen, the same."""
     blend: str = "linear"
     """What is mixed: "linear" light, or "display" values."""
-    mask: Painted | None = None
+    mask: Painted | np.ndarray | None = None
     """A mask, white where it happens first."""
     delay: float = DELAY
     """How much later it happens where the mask is black, a part of the time."""
@@ -79,8 +79,10 @@ class Course:
 
     def __post_init__(self) -> None:
         for name in ("warp_curve", "blend_curve"):
-            object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.end))
+            object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.duration))
         check_light(self.blend)
+        if isinstance(self.mask, np.ndarray):
+            object.__setattr__(self, "mask", Painted(self.mask))
         if not 0 <= self.delay <= DELAY_LIMIT:
             raise ValueError(f"delay {self.delay}: expected a part of the time, 0 … {DELAY_LIMIT}")
         if self.mask is not None and self.mask.values.max() > 1:
