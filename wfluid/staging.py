@@ -130,15 +130,7 @@ class _Stage:
         pair = paired(self.picture, other, self.morph.get("fit", "fill"))
         for text in pair.said:
             self.note(text)
-        width, height = self.morph.get("size", pair.size)
-        if min(width, height) <= 0:
-            raise SchemaError(("morph", "size"), f"{width:g} x {height:g}: expected positive numbers")
-        if abs(width / height * other.height / other.width - 1) > SAME_ASPECT:
-            raise SchemaError(
-                ("morph", "size"),
-                f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
-                f"{other.width} x {other.height} have another aspect",
-            )
+        _drawn_size(self.tables, "morph", other)
         return pair
 
     def _course(self) -> Course:
@@ -170,16 +162,8 @@ class _Stage:
 
     def _drawing(self) -> Drawing:
         """What the numbers of the scene's forces refer to."""
-        picture, tables = self.picture, self.tables
-        width, height = tables["picture"].get("size", (picture.width, picture.height))
-        if min(width, height) <= 0:
-            raise SchemaError(("picture", "size"), f"{width:g} x {height:g}: expected positive numbers")
-        if abs(width / height * picture.height / picture.width - 1) > SAME_ASPECT:
-            raise SchemaError(
-                ("picture", "size"),
-                f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
-                f"{picture.width} x {picture.height} have another aspect",
-            )
+        tables = self.tables
+        width, height = _drawn_size(tables, "picture", self.picture)
         settings = {
             "width": width,
             "height": height,
@@ -337,6 +321,20 @@ class _Stage:
     def _points(self) -> list[tuple[float, float]]:
         points = self.tables.get("tracks", {}).get("points", [])
         return [_at(("tracks", "points"), lambda at=at: self.drawing.place("a point", at)) for at in points]
+
+
+def _drawn_size(tables: Mapping[str, Any], key: str, picture: Picture) -> tuple[float, float]:
+    """Width and height of the frame that a table's pixels refer to: its `size`, or the picture's."""
+    width, height = tables[key].get("size", (picture.width, picture.height))
+    if min(width, height) <= 0:
+        raise SchemaError((key, "size"), f"{width:g} x {height:g}: expected positive numbers")
+    if abs(width / height * picture.height / picture.width - 1) > SAME_ASPECT:
+        raise SchemaError(
+            (key, "size"),
+            f"the scene is drawn for {width:g} x {height:g} pixels, the picture's "
+            f"{picture.width} x {picture.height} have another aspect",
+        )
+    return width, height
 
 
 def _found(table: Mapping[str, Any], side: float) -> GaussianForce:

@@ -173,6 +173,7 @@ def test_a_picture_that_becomes_itself_is_still(device_name):
     """A point that corresponds to itself: every frame is the picture, but for the look-up's rounding."""
     picture, points = waves(), [((0.3, 0.2), (0.3, 0.2))]
     found = morph(picture, picture, points, 0.5, 6, cells=16, device=device_name)
+    assert found.match.evaluations == 0  # nothing is searched for
     for frame in found.frames():
         assert max(frame.quality.displacement_max, frame.to_quality.displacement_max) < 1e-6
         np.testing.assert_allclose(frame.picture.pixels, picture.pixels, rtol=0, atol=1e-5)
@@ -418,3 +419,11 @@ def test_the_same_seed_gives_the_same_frames(device_name):
     one, other = (quick(a, b, device=device_name, seed=3) for _ in range(2))
     for frame, again in zip(one.frames(), other.frames(), strict=True):
         np.testing.assert_array_equal(frame.picture.pixels, again.picture.pixels)
+
+
+def test_a_mask_may_be_an_array(morph_of):
+    """Frames with it are those with the painting of it."""
+    found = going(morph_of("dots"), mask=np.array(SPLIT))
+    painted = going(morph_of("dots"), mask=Painted(SPLIT))
+    for one, other in zip(found.frames(), painted.frames(), strict=True):
+        np.testing.assert_array_equal(one.picture.pixels, other.picture.pixels)

@@ -92,6 +92,8 @@ def test_what_is_left_out_is_the_documented_default(folder):
     animation, _ = staged(folder, {"move": [{**MOVE, "time": 0.4}, {**MOVE, "time": 0.8}]})
     assert animation.timeline.end == pytest.approx(0.8)
     assert staged(folder, {"move": [MOVE]})[0].timeline.end == 2.0
+    animation, _ = staged(folder, {"move": [{**MOVE, "time": 0.33}]}, time={"fps": 7})
+    assert 0.33 <= animation.timeline.end < 0.33 + 1 / 7
 
 
 @pytest.mark.parametrize(
