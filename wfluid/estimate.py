@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 from wfluid.animation import Animation
 from wfluid.files import free_memory, readable_size
-from wfluid.morphing.morph import Course
 
 FIELDS, COUPLED_FIELDS = 77, 114
 """Fields of the finest grid that a solver, two states and their hierarchies hold, by kind of diffusion."""
@@ -48,8 +47,8 @@ class Estimate:
     """Time without compiling and writing."""
 
 
-def estimate(animation: Animation, frames_kept: int = 0, course: Course | None = None) -> Estimate:
-    """Memory and time of an animation, from its sizes alone; or of a morph's flow, with the morph's course.
+def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> Estimate:
+    """Memory and time of an animation from its sizes alone, or of a morph shown in so many frames.
 
     `frames_kept` is how many outputs hold every frame until the last: a GIF's palette needs them all.
     """
@@ -62,30 +61,30 @@ def estimate(animation: Animation, frames_kept: int = 0, course: Course | None =
         + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
         + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
     )
-    frames = len(course.order) if course else animation.frame_count
-    shown = 2 if course else 1 + len(animation.layers)
+    frames = morph_frames or animation.frame_count
+    shown = 2 if morph_frames else 1 + len(animation.layers)
     memory += (shown - 1) * _REAL * (channels + FIELDS_PER_PIXEL + channels * QUEUED_FRAMES) * width * height
     densities = len(animation.fluid.densities)
     memory += _REAL * grid.nx * grid.ny * (DENSITY_FIELDS * densities)
-    if course:
+    if morph_frames:
         memory += _REAL * grid.nx * grid.ny * FIELDS_A_STEP * animation.timeline.steps
     kept, run = LOOP_FRAMES.get(animation.loop, (0.0, 1.0))
     memory += _REAL * grid.nx * grid.ny * (2 + densities) * kept * frames
     memory += PROGRAM + frames_kept * 3 * frames * width * height
     steps = round(run * (frames - (animation.loop is None)) * animation.timeline.steps_per_frame)
-    steps = 2 * animation.timeline.steps if course else steps
+    steps = 2 * animation.timeline.steps if morph_frames else steps
     seconds = steps * grid.nx * grid.ny * (SECONDS_PER_CELL_STEP if apart else COUPLED_SECONDS)
     seconds += shown * frames * width * height * SECONDS_PER_PIXEL
     return Estimate(memory, seconds)
 
 
-def check_memory(animation: Animation, frames_kept: int = 0, course: Course | None = None) -> None:
+def check_memory(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> None:
     """Refuse an animation that will not fit.
 
     Raises:
         ValueError: with what it needs and what there is.
     """
-    need, there = estimate(animation, frames_kept, course).memory, free_memory()
+    need, there = estimate(animation, frames_kept, morph_frames).memory, free_memory()
     if need > there:
         raise ValueError(
             f"{animation.grid.nx} x {animation.grid.ny} cells and {animation.frame_count} frames "

@@ -9,7 +9,7 @@ coefficients jump and cycles alone would stall. On the coarsest level a stored i
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -103,7 +103,7 @@ class LinearSystem:
         self._dense = wp.zeros(self.unknowns, dtype=Real, device=device)
         self._factors: dict[int, wp.array] = {}
         self._rates = wp.zeros(SWEEP_LIMIT, dtype=Real, device=device)
-        self._conjugate: _ConjugateGradients | None = None
+        self._conjugate: ConjugateGradients | None = None
 
     def invert_coarsest(self) -> None:
         """Store the inverse of the coarsest level's operator: launches only; after its numbers change."""
@@ -153,7 +153,7 @@ class LinearSystem:
             factors = chebyshev_factors(*self.interval, cycles) if cycles > 1 else np.ones(1)
             self._factors[cycles] = wp.array(factors, dtype=Real, device=self.device)
         if how.method == "conjugate gradients" and self._conjugate is None:
-            self._conjugate = _ConjugateGradients(self)
+            self._conjugate = ConjugateGradients(self.levels[0], self.zero, self.cycle, self.device)
 
     def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None = None) -> None:
         """X = what `how` makes of b. Fills the ghosts of b and x.
@@ -165,7 +165,7 @@ class LinearSystem:
         if how.method == "multigrid":
             self._cycles(b, x, how.iterations)
         elif how.method == "conjugate gradients":
-            self._conjugate.solve(how, b, x, whole)
+            self._conjugate.solve(b, x, how.tolerance, how.iterations, whole)
         elif how.method == "chebyshev":
             rates = [self._rates[n : n + 1] for n in range(how.iterations)]
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
@@ -228,13 +228,19 @@ class LinearSystem:
         return Residual(how.method, ran, left, right, norm_a * answer)
 
 
-class _ConjugateGradients:
-    """Conjugate gradients preconditioned by one cycle of a system, with everything they keep."""
+class ConjugateGradients:
+    """Conjugate gradients on the equation of a level, with everything they keep.
 
-    def __init__(self, system: LinearSystem):
-        self.system, self.device = system, system.device
-        self.layout = system.levels[0].layout
-        components = len(system.levels[0].points)
+    `precondition(r, z)` writes to z what a symmetric approximate inverse makes of r, both with ghosts;
+    `zero` is a field of zeros a component.
+    """
+
+    def __init__(
+        self, level: Level, zero: Vector, precondition: Callable[[Vector, Vector], None], device: wp.Device
+    ):
+        self.level, self.zero, self.precondition, self.device = level, zero, precondition, device
+        self.layout = level.layout
+        components = len(level.points)
         self.r, self.z, self.p, self.q = (vector(self.layout, self.device, components) for _ in range(4))
         self._rows = self.layout.ny * components
         self._products, self._wholes = (
@@ -257,23 +263,22 @@ class _ConjugateGradients:
                 inputs = [f, g, layout.nx, layout.pitch, n * layout.ny]
                 krylov.row_products.launch(layout.ny, self.device, inputs, [out])
 
-    def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None) -> None:
-        """X = A^-1 b to the tolerance; b with ghosts, x comes with ghosts."""
-        top = self.system.levels[0]
+    def solve(self, b: Vector, x: Vector, tolerance: float, most: int, whole: Vector | None) -> None:
+        """x = A^-1 b to the tolerance in `most` iterations at most; b with ghosts, x comes with ghosts."""
         alone(lambda: [start.zero_() for start in x])
         alone(lambda: [wp.copy(r, f) for f, r in zip(b, self.r, strict=True)])
-        self.system.cycle(self.r, self.z)
+        self.precondition(self.r, self.z)
         alone(lambda: [wp.copy(p, z) for z, p in zip(self.z, self.p, strict=True)])
         self._multiply(self.r, self.z, self._products)
         self._multiply(*((whole, whole) if whole else (self.r, self.z)), self._wholes)
-        inputs = [self._products, self._wholes, self._rows, Real(how.tolerance), how.iterations]
+        inputs = [self._products, self._wholes, self._rows, Real(tolerance), most]
         krylov.begin.launch(1, self.device, inputs, [self._rz, self._limit, self._going, self._iterations])
-        repeat_while(self._going, lambda: self._iterate(x, how.iterations))
-        top.fill(x)
+        repeat_while(self._going, lambda: self._iterate(x, most))
+        self.level.fill(x)
 
     def _iterate(self, x: Vector, most: int) -> None:
-        top, layout, device = self.system.levels[0], self.layout, self.device
-        top.residual(self.system.zero, self.p, self.q)  # q = -A p
+        top, layout, device = self.level, self.layout, self.device
+        top.residual(self.zero, self.p, self.q)  # q = -A p
         top.fill(self.q)
         self._multiply(self.p, self.q, self._products)
         krylov.measure_length.launch(1, device, [self._products, self._rows, self._rz], [self._length])
@@ -281,7 +286,7 @@ class _ConjugateGradients:
             for p, q, f, r in zip(self.p, self.q, x, self.r, strict=True):
                 krylov.advance.launch(layout, device, [p, q, self._length], [f, r])
         top.fill(self.r)
-        self.system.cycle(self.r, self.z)
+        self.precondition(self.r, self.z)
         self._multiply(self.r, self.z, self._products)
         inputs = [self._products, self._rows, self._limit, most]
         outputs = [self._rz, self._ratio, self._going, self._iterations]

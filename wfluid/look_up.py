@@ -16,13 +16,18 @@ from wfluid.picture import Picture
 from wfluid.state import Vector, field, vector
 from wfluid.walls import Ghosts, Walls
 
-FILTERS = {
+FILTERS = ("nearest", "bilinear", "cubic", "lanczos")
+"""How a picture is read between its pixels."""
+
+EDGES = ("clamp", "mirror", "wrap", "transparent")
+"""What lies beyond a picture; programs know an edge by its place here."""
+
+_PROGRAMS = {
     "nearest": lookup.look_up_nearest,
     "bilinear": lookup.look_up_bilinear,
     "cubic": lookup.look_up_cubic,
     "lanczos": lookup.look_up_lanczos,
 }
-EDGES = {"clamp": 0, "mirror": 1, "wrap": 2, "transparent": 3}
 
 STRIPS = 8
 """Most threads that share a look-up."""
@@ -92,8 +97,8 @@ class LookUp:
         self.device, self.grid, self.walls = device, grid, walls
         self.picture, self.filter = picture, filter
         self.source = PictureOnDevice(picture, edge == "transparent", device)
-        self._program = FILTERS[filter]
-        self.edges = [EDGES["wrap" if periodic else edge] for periodic in walls.periodic]
+        self._program = _PROGRAMS[filter]
+        self.edges = [EDGES.index("wrap" if periodic else edge) for periodic in walls.periodic]
         self.width, self.height = width or picture.width, height or picture.height
         self.slopes = self.source.width / grid.nx, self.source.height / grid.ny
         self.strip = Layout(grid.nx, self.height)

@@ -12,7 +12,6 @@ from typing import Protocol
 import numpy as np
 
 from wfluid import movie
-from wfluid.animation import Frame
 from wfluid.files import remove_leftovers, whole_file
 from wfluid.picture import Encoding, Picture, PictureError, encode, write_picture
 
@@ -90,9 +89,15 @@ def check_folder(path: Path) -> None:
     remove_leftovers(path.parent)
 
 
+class HasPicture(Protocol):
+    """Anything that shows a picture, such as a `Frame`."""
+
+    picture: Picture
+
+
 def write_animation(
     path: str | os.PathLike,
-    frames: Iterable[Frame],
+    frames: Iterable[HasPicture],
     fps: float = 24.0,
     start: int = FIRST_FRAME,
     encoding: Encoding | None = None,

@@ -90,7 +90,7 @@ def run_scene(scene: Scene, how: Run) -> int:
     notes: list[str] = []
     staged = stage_all(scene, how.device, notes.append)
     animation, aims, course = staged.animation, staged.aims, staged.course
-    check_memory(animation, _kept_frames(scene.outputs), course)
+    check_memory(animation, _kept_frames(scene.outputs), len(course.order) if course else None)
     writers = [] if how.preview or how.dry_run else _writers(scene, animation)
 
     def note(text: str) -> None:
@@ -259,10 +259,9 @@ def _shown(frame: Frame, of: str) -> Picture:
 def _say_plan(animation: Animation, outputs: Sequence[Output], course: Course | None) -> None:
     """Print what a run would take and write."""
     timeline, grid = animation.timeline, animation.grid
-    guess = estimate(animation, _kept_frames(outputs), course)
-    frames, fps = (
-        (len(course.order), course.timeline.fps) if course else (animation.frame_count, timeline.fps)
-    )
+    morph_frames = len(course.order) if course else None
+    guess = estimate(animation, _kept_frames(outputs), morph_frames)
+    frames, fps = morph_frames or animation.frame_count, course.timeline.fps if course else timeline.fps
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     size = animation.width or animation.picture.width, animation.height or animation.picture.height
     print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")
