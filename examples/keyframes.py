@@ -83,7 +83,7 @@ def main():
     frames = list(match.animation.frames())
     write_animation(options.output, frames + frames[-2:0:-1], fps=24)
     if options.plot:
-        from wfluid.keyframe_plot import plot_match
+        from wfluid.keyframes.plot import plot_match
 
         plot_match(match, options.plot)
     for name, value in check(match).items():

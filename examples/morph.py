@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from wfluid import Picture, morph, read_picture, write_animation, write_picture
-from wfluid.point_file import read_points
+from wfluid.files.points import read_points
 
 IMAGES = Path(__file__).parent / "images"
 

@@ -15,18 +15,8 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from wfluid import (
-    Animation,
-    Drawing,
-    Fluid,
-    Freeze,
-    Painted,
-    Picture,
-    Timeline,
-    parse_force,
-    read_picture,
-)
-from wfluid.output import open_output
+from wfluid import Animation, Drawing, Fluid, Freeze, Painted, Picture, Timeline, parse_force, read_picture
+from wfluid.files.output import open_output
 
 IMAGES = Path(__file__).parent / "images"
 STIFF, STILL = IMAGES / "raccoon_mask.png", IMAGES / "raccoon_eyes.png"

@@ -14,7 +14,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 from wfluid import Animation, Constant, Fluid, GaussianForce, Picture, Timeline, read_picture
-from wfluid.output import open_output
+from wfluid.files.output import open_output
 
 PICTURE = Path(__file__).parent / "images" / "astronaut.jpg"
 

@@ -3,52 +3,6 @@
 Importing the package registers every program, so that each device's module is built once and whole.
 """
 
-from wfluid.kernels import (
-    advection,
-    advection_adjoint,
-    dense,
-    forces,
-    forces_adjoint,
-    ghosts,
-    krylov,
-    lookup,
-    lookup_adjoint,
-    measure,
-    misfit,
-    projection,
-    projection_adjoint,
-    relaxation,
-    rows,
-    scatter,
-    sources,
-    transfer,
-    transport,
-    transport_adjoint,
-    viscosity,
-    viscosity_adjoint,
-)
+from wfluid.kernels import adjoint, solve, step, view
 
-__all__ = [
-    "advection",
-    "advection_adjoint",
-    "dense",
-    "forces",
-    "forces_adjoint",
-    "ghosts",
-    "krylov",
-    "lookup",
-    "lookup_adjoint",
-    "measure",
-    "misfit",
-    "projection",
-    "projection_adjoint",
-    "relaxation",
-    "rows",
-    "scatter",
-    "sources",
-    "transfer",
-    "transport",
-    "transport_adjoint",
-    "viscosity",
-    "viscosity_adjoint",
-]
+__all__ = ["adjoint", "solve", "step", "view"]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from wfluid.device import load_kernels, open_device
-from wfluid.fluid import Fluid
-from wfluid.grid import Grid
-from wfluid.solver import Solver
+from wfluid.domain.grid import Grid
+from wfluid.fields.device import load_kernels, open_device
+from wfluid.model.fluid import Fluid
+from wfluid.step.solver import Solver
 
 DOUBLE = os.environ.get("WFLUID_PRECISION") == "float64"
 

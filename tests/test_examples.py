@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from wfluid import Morph, Timeline, match_keyframes, read_scene
-from wfluid.morphing.morph import Course
-from wfluid.staging import stage_all
+from wfluid.morphing.settings import Course
+from wfluid.staging.build import stage_all
 
 pytestmark = pytest.mark.beside
 
@@ -128,7 +128,7 @@ def test_scenes_with_found_forces_need_no_search(device, name):
 
 
 def test_the_scenes_reference_is_what_the_command_prints():
-    from wfluid.scene_format import reference
+    from wfluid.scene.reference import reference
 
     text = (ROOT / "examples" / "scenes" / "README.md").read_text()
     assert text.endswith(reference())
@@ -170,11 +170,11 @@ def test_the_readmes_python_runs(tmp_path):
 
 
 def test_every_option_of_the_command_is_in_the_readme():
-    from wfluid.cli import _parser
-    from wfluid.scene_format import COURSE
+    from wfluid.cli.parser import build_parser
+    from wfluid.scene.format import COURSE
 
     text = (ROOT / "README.md").read_text()
-    (verbs,) = [a for a in _parser()._actions if a.dest == "verb"]
+    (verbs,) = [a for a in build_parser()._actions if a.dest == "verb"]
     for verb, parser in verbs.choices.items():
         assert f"wfluid {verb}" in text
         for action in parser._actions:

@@ -2,6 +2,6 @@
 
 import sys
 
-from wfluid.cli import main
+from wfluid.cli.main import main
 
 sys.exit(main())

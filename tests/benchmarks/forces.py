@@ -6,13 +6,14 @@ import numpy as np
 import warp as wp
 from timing import alternate
 
-from wfluid.density import Density, Source
-from wfluid.device import open_device
-from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce, Growth, VortexForce, Wind
-from wfluid.grid import Grid
-from wfluid.noise_force import NoiseForce
-from wfluid.solver import Solver
+from wfluid.domain.grid import Grid
+from wfluid.fields.device import open_device
+from wfluid.model.densities import Density, Source
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce, Growth, VortexForce
+from wfluid.model.noise_force import NoiseForce
+from wfluid.model.uniform_forces import Wind
+from wfluid.step.solver import Solver
 
 
 def stepping(solver, forces, device):

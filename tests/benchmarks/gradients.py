@@ -19,13 +19,13 @@ import numpy as np
 import warp as wp
 from timing import alternate
 
-from wfluid.control.functional import Functional
-from wfluid.control.objectives import ParticleMisfit
-from wfluid.control.variables import Free
-from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce
-from wfluid.grid import Grid
-from wfluid.timeline import Timeline
+from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import Timeline
+from wfluid.gradient.functional import Functional
+from wfluid.gradient.objectives import ParticleMisfit
+from wfluid.gradient.variables import Free
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce
 
 RATE = 96
 POINTS = np.array([[0.31, 0.42], [0.5, 0.52], [0.6, 0.2], [0.45, 0.6]])

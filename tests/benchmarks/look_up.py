@@ -6,15 +6,15 @@ import numpy as np
 import warp as wp
 from timing import alternate
 
-from wfluid.device import open_device
-from wfluid.envelopes import Instantaneous
-from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce
-from wfluid.grid import Grid
-from wfluid.look_up import LookUp
-from wfluid.picture import Picture
-from wfluid.solver import Solver
-from wfluid.walls import Walls
+from wfluid.domain.envelopes import Instantaneous
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.device import open_device
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.pictures.picture import Picture
+from wfluid.step.solver import Solver
+from wfluid.view.lookup import LookUp
 
 WIDTH, HEIGHT = 1920, 1080
 

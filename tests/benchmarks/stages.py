@@ -11,11 +11,11 @@ import numpy as np
 import warp as wp
 from timing import alternate
 
-from wfluid.device import open_device
-from wfluid.fluid import Fluid
-from wfluid.forces import GaussianForce
-from wfluid.grid import Grid
-from wfluid.solver import Solver
+from wfluid.domain.grid import Grid
+from wfluid.fields.device import open_device
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.step.solver import Solver
 
 FORCE = GaussianForce((0.4, 0.5), (2.0, 1.0), 0.08)
 

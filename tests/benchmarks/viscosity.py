@@ -11,13 +11,14 @@ import warp as wp
 from stages import FORCE, graph, jax_step
 from timing import alternate
 
-from wfluid.device import open_device
-from wfluid.fluid import Fluid
-from wfluid.grid import Grid
-from wfluid.linear import Solve, norm
-from wfluid.painted import Freeze
-from wfluid.solver import Solver
-from wfluid.state import from_numpy, vector
+from wfluid.domain.grid import Grid
+from wfluid.fields.arrays import from_numpy, vector
+from wfluid.fields.device import open_device
+from wfluid.fields.sums import norm
+from wfluid.model.fluid import Fluid
+from wfluid.model.painted import Freeze
+from wfluid.solve.system import Solve
+from wfluid.step.solver import Solver
 
 DT = 1 / 24
 

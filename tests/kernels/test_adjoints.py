@@ -12,21 +12,28 @@ import pytest
 import warp as wp
 from inner_products import inner, noise, padded, put_padded
 from viscous_media import DT, MEDIA, WALLS, centres, coupled, disc, frozen, media, random_vector
-from wfluid.kernels import advection, advection_adjoint, scatter, transport, transport_adjoint
-from wfluid.kernels.cells import ADJOINT, HALO, Layout, Real
+from wfluid.kernels.adjoint import advection as advection_adjoint
+from wfluid.kernels.adjoint import scatter
+from wfluid.kernels.adjoint import transport as transport_adjoint
+from wfluid.kernels.cell.layout import HALO, Layout
+from wfluid.kernels.cell.program import ADJOINT
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.step import advection, transport
 
-import wfluid.control.functional  # noqa: F401 - all of the adjoint's kernels, before any is loaded
+import wfluid.gradient.functional  # noqa: F401 - all of the adjoint's kernels, before any is loaded
 from wfluid import Buoyancy, Density, Fluid, GaussianForce, Grid, Growth, Painted, Source, VortexForce, Wind
-from wfluid.blobs import Blobs, blob_of
-from wfluid.density import PaintedSource
-from wfluid.device import load_kernels
-from wfluid.diffusion import ScalarDiffusion
-from wfluid.forces import Blob
-from wfluid.impulses import Impulses
-from wfluid.multigrid import Points
-from wfluid.stages import Stages
-from wfluid.state import State, field, from_numpy, to_numpy, vector
-from wfluid.walls import Ghosts, Rule, Walls
+from wfluid.domain.walls import Rule, Walls
+from wfluid.fields.arrays import field, from_numpy, to_numpy, vector
+from wfluid.fields.device import load_kernels
+from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.state import State
+from wfluid.model.densities import PaintedSource
+from wfluid.model.force import Blob
+from wfluid.solve.multigrid import Points
+from wfluid.step.diffusion import ScalarDiffusion
+from wfluid.step.forcing import Impulses
+from wfluid.step.gaussians import Blobs, blob_of
+from wfluid.step.step import Stages
 
 pytestmark = pytest.mark.float64
 

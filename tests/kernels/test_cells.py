@@ -3,24 +3,14 @@
 import numpy as np
 import pytest
 import warp as wp
-from wfluid.kernels import advection, relaxation
-from wfluid.kernels.cells import (
-    ADJOINT,
-    FORWARD,
-    HALO,
-    SPAN,
-    Field,
-    Layout,
-    Program,
-    Real,
-    RowReal,
-    Uniform,
-    cells,
-    module_of,
-)
+from wfluid.kernels.cell.layout import HALO, SPAN, Layout
+from wfluid.kernels.cell.program import ADJOINT, FORWARD, Program, cells, module_of
+from wfluid.kernels.cell.real import Field, Real, RowReal, Uniform
+from wfluid.kernels.solve import five_point
+from wfluid.kernels.step import advection
 
 from wfluid import kernels
-from wfluid.state import from_numpy, to_numpy
+from wfluid.fields.arrays import from_numpy, to_numpy
 
 
 def numbered(i: int, j: int, k: int, factor: Uniform, row: RowReal, out: Field):
@@ -56,16 +46,19 @@ def test_a_span_never_leaves_its_row(device, size):
 
 def programs():
     """Every per-cell program of the package, by name."""
-    for name in kernels.__all__:
-        for attribute, value in vars(getattr(kernels, name)).items():
-            if isinstance(value, Program) and value.func.module.name == f"wfluid.kernels.{name}":
-                yield pytest.param(value, id=f"{name}.{attribute}")
+    for folder in kernels.__all__:
+        package = getattr(kernels, folder)
+        for name in package.__all__:
+            for attribute, value in vars(getattr(package, name)).items():
+                home = f"wfluid.kernels.{folder}.{name}"
+                if isinstance(value, Program) and value.func.module.name == home:
+                    yield pytest.param(value, id=f"{folder}.{name}.{attribute}")
 
 
 @pytest.mark.parametrize(
     ("program", "inputs"),
     [
-        (relaxation.residual, lambda a, n, p: [a[0], a[1], n[0:1], n[1:2], n[2:3], p]),
+        (five_point.residual, lambda a, n, p: [a[0], a[1], n[0:1], n[1:2], n[2:3], p]),
         (advection.trace_midpoint, lambda a, n, p: [a[0], a[1], n[0:1], n[1:2], 70, 9, 0, 1, p]),
         (advection.advect_face_cubic, lambda a, n, p: [a[0], a[1], a[2], p, 70, 9, 0, 1, p]),
     ],
@@ -93,7 +86,7 @@ def test_spans_equal_single_cells_bit_for_bit(device, program, inputs):
 
 
 ORIGINAL_ANNOTATIONS = {
-    relaxation.residual: {"centre": Uniform, "ax": Uniform, "ay": Uniform},
+    five_point.residual: {"centre": Uniform, "ax": Uniform, "ay": Uniform},
     advection.trace_midpoint: {"dt_hx": Uniform, "dt_hy": Uniform},
     advection.advect_face_cubic: {},
 }

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from wfluid.kernels.cells import HALO, Layout
+from wfluid.kernels.cell.layout import HALO, Layout
 
-from wfluid.state import field, from_numpy
-from wfluid.walls import Ghosts, Rule, ghost_table
+from wfluid.domain.walls import Rule
+from wfluid.fields.arrays import field, from_numpy
+from wfluid.fields.ghosts import Ghosts, ghost_table
 
 
 def padded_axis(values, rule, axis):

@@ -4,12 +4,14 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from wfluid.device import Replay
-from wfluid.grid import Grid
-from wfluid.look_up import LookUp
-from wfluid.picture import Picture
-from wfluid.state import State, from_numpy
-from wfluid.walls import Ghosts, Walls
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.arrays import from_numpy
+from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.graph import Replay
+from wfluid.fields.state import State
+from wfluid.pictures.picture import Picture
+from wfluid.view.lookup import LookUp
 
 WIDTH, HEIGHT = 96, 70
 

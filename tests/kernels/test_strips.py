@@ -7,11 +7,11 @@ import threading
 import numpy as np
 import pytest
 import warp as wp
-from wfluid.kernels.cells import strips
-from wfluid.kernels.strips import GIVEN_UP, STRIP, repeat_while, share, together
+from wfluid.kernels.cell.program import strips
+from wfluid.kernels.cell.strips import GIVEN_UP, STRIP, repeat_while, share, together
 
-import wfluid.device
-import wfluid.stages
+import wfluid.fields.device
+import wfluid.step.step
 from wfluid import (
     Buoyancy,
     Density,
@@ -26,7 +26,8 @@ from wfluid import (
     Source,
     VortexForce,
 )
-from wfluid.device import Replay, helpers
+from wfluid.fields.graph import Replay
+from wfluid.system.threads import helpers
 
 FORCE = GaussianForce((0.4, 0.5), (2.0, 1.0), 0.08)
 WEIGHTED = GaussianForce((0.6, 0.4), (-1.0, 1.0), 0.1, weight=Painted(np.eye(4)))
@@ -53,8 +54,8 @@ def cpu(device):
 
 def test_a_grid_of_few_rows_is_left_to_the_first_strip(cpu, monkeypatch):
     """No launch is shared, every meeting is a loop's, and both threads come to the end."""
-    monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0)
-    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.step.step, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.step.step, "free_cores", lambda: 2)
     mu = np.where(np.arange(160) % 40 < 20, 1.0, 0.001) * np.ones((30, 1))
     solver = Solver(Grid(160, 30, 1.0, 30 / 160), Fluid(viscosity=mu), cpu)
     a, b = solver.rest(), solver.rest()
@@ -69,8 +70,8 @@ def test_two_threads_compute_the_bits_of_one(cpu, monkeypatch, name):
     """Velocity, map and pressure of steps shared by two threads equal those of one, exactly."""
     states = []
     for threads in (1, 2):
-        monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0 if threads == 2 else 10**9)
-        monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
+        monkeypatch.setattr(wfluid.step.step, "SHARED_CELLS", 0 if threads == 2 else 10**9)
+        monkeypatch.setattr(wfluid.step.step, "free_cores", lambda: 2)
         solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(**FLUIDS[name]), cpu)
         assert (solver._pool is not None) == (threads == 2)
         a, b = solver.rest(), solver.rest()
@@ -97,9 +98,9 @@ def test_two_threads_compute_the_bits_of_one_under_every_force(cpu, monkeypatch)
         Buoyancy("ink", (0.0, -1.0)),
     ]
     states = []
-    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.step.step, "free_cores", lambda: 2)
     for least in (0, 10**9):
-        monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", least)
+        monkeypatch.setattr(wfluid.step.step, "SHARED_CELLS", least)
         solver = Solver(Grid(129, 97, 1.0, 0.7), Fluid(densities=[ink]), cpu)
         a, b = (solver.rest([(0.5, 0.5), (0.2, 0.3)]) for _ in range(2))
         for step in range(4):
@@ -187,8 +188,8 @@ def count_down(passes: wp.array[int], going: wp.array[int]):
 
 def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
     """The calling thread is stopped before its strip: the other ends, and the next step is right."""
-    monkeypatch.setattr(wfluid.stages, "SHARED_CELLS", 0)
-    monkeypatch.setattr(wfluid.stages, "free_cores", lambda: 2)
+    monkeypatch.setattr(wfluid.step.step, "SHARED_CELLS", 0)
+    monkeypatch.setattr(wfluid.step.step, "free_cores", lambda: 2)
     solver = Solver(Grid(128, 96, 1.0, 0.7), Fluid(), cpu)
     a, b, c = solver.rest(), solver.rest(), solver.rest()
     solver.step(a, b, [FORCE], 0.0, 0.1)
@@ -215,9 +216,9 @@ def test_an_interrupted_step_leaves_no_thread_waiting(cpu, monkeypatch):
 def test_a_forked_process_steps_with_threads_of_its_own(cpu):
     """The child has inherited no helper; it must not wait for one."""
     code = (
-        "import os, wfluid.stages as module\n"
+        "import os, wfluid.step.step as module\n"
         "from wfluid import Fluid, Grid, Solver\n"
-        "from wfluid.device import open_device\n"
+        "from wfluid.fields.device import open_device\n"
         "module.SHARED_CELLS, module.free_cores = 0, lambda: 2\n"
         "solver = Solver(Grid(64, 64), Fluid(), open_device())\n"
         "a, b = solver.rest(), solver.rest()\n"

@@ -23,9 +23,10 @@ from morph_cases import (
 )
 
 from wfluid import Painted, Picture, Timeline, morph
-from wfluid.control.match import REACHED
-from wfluid.morphing.morph import LEAST_JACOBIAN, TOLERANCE, Course
-from wfluid.picture import resample
+from wfluid.keyframes.match import REACHED
+from wfluid.morphing.morph import LEAST_JACOBIAN, TOLERANCE
+from wfluid.morphing.settings import Course
+from wfluid.pictures.picture import resample
 
 pytestmark = pytest.mark.beside
 

@@ -11,7 +11,7 @@ import warp as wp
 from oracles import from_streamfunction
 from viscous_media import centres, disc
 from warp_objectives import mean_square, product
-from wfluid.kernels.cells import HALO
+from wfluid.kernels.cell.layout import HALO
 
 from wfluid import (
     Arbitrary,
@@ -35,17 +35,10 @@ from wfluid import (
     VortexForce,
     Wind,
 )
-from wfluid.control.functional import Functional
-from wfluid.control.objectives import (
-    DensityMisfit,
-    Effort,
-    MapMisfit,
-    Objective,
-    ParticleFunction,
-    ParticleMisfit,
-    WarpObjective,
-)
-from wfluid.control.variables import Free
+from wfluid.gradient.functional import Functional
+from wfluid.gradient.objectives import Effort, Objective, ParticleFunction, ParticleMisfit
+from wfluid.gradient.state_objectives import DensityMisfit, MapMisfit, WarpObjective
+from wfluid.gradient.variables import Free
 
 GRID = Grid(23, 18, 1.0, 0.7)
 """Another number of cells along y, of another height."""

@@ -1,9 +1,9 @@
 """Inner products of fields, and what the tests of transposes share: <y, A x> = <A^T y, x>."""
 
 import numpy as np
-from wfluid.kernels.cells import HALO
+from wfluid.kernels.cell.layout import HALO
 
-from wfluid.state import from_numpy, vector
+from wfluid.fields.arrays import from_numpy, vector
 
 
 def padded(f, layout):

@@ -10,10 +10,10 @@ import numpy as np
 from viscous_media import disc
 
 from wfluid import Animation, Fluid, GaussianForce, Grid, Timeline
-from wfluid.control.keyframes import ParticleKeyframe
-from wfluid.control.match import Match, match_keyframes
-from wfluid.control.variables import Free
-from wfluid.picture import Picture
+from wfluid.gradient.variables import Free
+from wfluid.keyframes.keyframes import ParticleKeyframe
+from wfluid.keyframes.match import Match, match_keyframes
+from wfluid.pictures.picture import Picture
 
 SIDE = 512
 """Longer side of the pictures [px]: residuals are told in it."""

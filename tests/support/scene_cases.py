@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from wfluid.animation import Animation
-from wfluid.forces import BlobForce, Group, flat
-from wfluid.paths import place_at
+from wfluid.animation.animation import Animation
+from wfluid.domain.paths import place_at
+from wfluid.model.force import BlobForce, Group, flat
 
 SIDE = 60
 """Longer side of the pictures [px]."""

@@ -6,11 +6,13 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
-from wfluid.cli import main
-from wfluid.picture import Picture, write_picture
-from wfluid.scene import SHOWN
-from wfluid.scene_format import SCENE, tables
-from wfluid.schema import Key, Many, Named, Table, Variants
+from wfluid.cli.main import main
+from wfluid.pictures.picture import Picture
+from wfluid.pictures.stills import write_picture
+from wfluid.scene.format import SCENE
+from wfluid.scene.reference import tables
+from wfluid.scene.scene import SHOWN
+from wfluid.scene.schema import Key, Many, Named, Table, Variants
 
 VALUES = (
     *(0, 1, 2, 30, 1001, 2**32 - 1, -1, 0.25, 1 / 3, 7.5, -2.5, 1e-5, 1.5e300, True, False),

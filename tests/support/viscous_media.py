@@ -3,9 +3,9 @@
 import numpy as np
 
 from wfluid import Fluid, Freeze
-from wfluid.diffusion import CoupledDiffusion
-from wfluid.medium import Medium
-from wfluid.state import from_numpy, vector
+from wfluid.fields.arrays import from_numpy, vector
+from wfluid.step.coefficients import Medium
+from wfluid.step.diffusion import CoupledDiffusion
 
 WALLS = ("free-slip", "no-slip", "periodic", "no-slip,periodic", "free-slip,no-slip")
 """Each kind of wall on all sides, and two kinds mixed."""

@@ -1,7 +1,7 @@
 """Kernels of one's own for objectives: Warp finds their gradients."""
 
 import warp as wp
-from wfluid.kernels.cells import Real
+from wfluid.kernels.cell.real import Real
 
 
 @wp.kernel(module="tests.objectives")

@@ -1,1 +1,1 @@
-"""Morphs: one picture flows into another."""
+"""One picture flows into another."""

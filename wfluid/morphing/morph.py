@@ -19,21 +19,23 @@ from functools import cached_property
 
 import numpy as np
 
-from wfluid.animation import Animation, Frame
-from wfluid.blur import blurred
-from wfluid.control.keyframes import ParticleKeyframe
-from wfluid.control.match import Match, match_keyframes
-from wfluid.control.search import Progress
-from wfluid.coordinate_map import CoordinateMap, MapQuality, measure_map
-from wfluid.fluid import Fluid
-from wfluid.morphing.blending import blended, check_light
-from wfluid.morphing.pairing import Pair, paired
-from wfluid.morphing.passage import Passage, passage_of
-from wfluid.morphing.timing import DELAY, DELAY_LIMIT, EASE, Curve, curve_of, local
-from wfluid.painted import Painted
-from wfluid.paths import Place
-from wfluid.picture import Picture
-from wfluid.timeline import Timeline
+from wfluid.animation.animation import Animation
+from wfluid.domain.curves import DELAY, EASE, local
+from wfluid.domain.operators import blurred
+from wfluid.domain.paths import Place
+from wfluid.domain.timeline import Timeline
+from wfluid.keyframes.keyframes import ParticleKeyframe
+from wfluid.keyframes.match import Match, match_keyframes
+from wfluid.keyframes.search import Progress
+from wfluid.model.fluid import Fluid
+from wfluid.model.painted import Painted
+from wfluid.morphing.flow_maps import Passage, passage_of
+from wfluid.morphing.frame import MorphFrame
+from wfluid.morphing.settings import Course
+from wfluid.pictures.blend import blended
+from wfluid.pictures.pairing import Pair, paired
+from wfluid.pictures.picture import Picture
+from wfluid.view.quality import measure_map
 
 FLOW = Timeline(1.0, fps=24.0, substeps=2)
 """The flow's own time: a morph's frames are at parts of it, however long the morph is shown."""
@@ -50,63 +52,6 @@ TOLERANCE = 0.5 / 512
 
 LEAST_JACOBIAN = 0.1
 """Least det J that a timing mask may leave a map; a flow that leaves less is not to blame on it."""
-
-
-@dataclass(frozen=True)
-class Course:
-    """How a morph goes.
-
-    Raises:
-        ValueError: no such curve or light, keys of a curve outside the duration, a delay outside 0 … 0.9.
-    """
-
-    timeline: Timeline
-    """When frames are shown; the first is the one picture, the last the other."""
-    warp_curve: str | Curve | Mapping[float, float] = EASE
-    """How far points are on their ways: "linear", "ease", or values 0 … 1 by time [s]."""
-    blend_curve: str | Curve | Mapping[float, float] = EASE
-    """How much of the second picture is seen, the same."""
-    blend: str = "linear"
-    """What is mixed: "linear" light, or "display" values."""
-    mask: Painted | np.ndarray | None = None
-    """A mask, white where it happens first."""
-    delay: float = DELAY
-    """How much later it happens where the mask is black, a part of the time."""
-    reverse: bool = False
-    """From the second picture to the first: the same frames, the last one first."""
-    pingpong: bool = False
-    """There and back, without end: the frames between are shown again after the last."""
-
-    def __post_init__(self) -> None:
-        for name in ("warp_curve", "blend_curve"):
-            object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.duration))
-        check_light(self.blend)
-        if isinstance(self.mask, np.ndarray):
-            object.__setattr__(self, "mask", Painted(self.mask))
-        if not 0 <= self.delay <= DELAY_LIMIT:
-            raise ValueError(f"delay {self.delay}: expected a part of the time, 0 … {DELAY_LIMIT}")
-        if self.mask is not None and self.mask.values.max() > 1:
-            raise ValueError("a timing mask: expected values 0 … 1")
-
-    @property
-    def order(self) -> list[int]:
-        """The frames by their number from the first picture's on, in the order they are shown."""
-        frames = list(range(self.timeline.frames))
-        frames = frames[::-1] if self.reverse else frames
-        return frames + frames[-2:0:-1] if self.pingpong else frames
-
-
-@dataclass(frozen=True)
-class MorphFrame(Frame):
-    """A frame of a morph: `map` and `quality` are those of the first picture.
-
-    `points` are the keyframes' points, but with a timing mask, by which they have no one place.
-    """
-
-    to_map: CoordinateMap | None = None
-    """Where in the second picture, stretched over the frame, its colours come from."""
-    to_quality: MapQuality | None = None
-    """What that map does to the second picture."""
 
 
 @dataclass(frozen=True, eq=False)

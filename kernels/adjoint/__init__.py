@@ -1,0 +1,27 @@
+"""The transposes of the stages."""
+
+from wfluid.kernels.adjoint import (
+    advection,
+    forces,
+    ghosts,
+    lookup,
+    misfit,
+    projection,
+    scatter,
+    step_table,
+    transport,
+    viscosity,
+)
+
+__all__ = [
+    "advection",
+    "forces",
+    "ghosts",
+    "lookup",
+    "misfit",
+    "projection",
+    "scatter",
+    "step_table",
+    "transport",
+    "viscosity",
+]

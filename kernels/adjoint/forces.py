@@ -1,0 +1,178 @@
+"""The adjoint of forces and sources (`forces`, `sources`): gradients with respect to a Gaussian's numbers.
+
+All that a Gaussian g about c with radius sigma adds to a field is a polynomial of r = (x - c) / sigma
+times g, and so are the derivatives with respect to c, sigma and its strengths. So with F the gradient with
+respect to the field, the moments
+
+    M_ab = sum over the points of  F r_x^a r_y^b g        a + b <= 4
+
+are all that is needed (`wfluid.blobs` puts them together); they are summed along rows first.
+"""
+
+import warp as wp
+from wfluid.kernels.cell.native import inside
+from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
+from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
+from wfluid.kernels.solve.sums import LANES, Lane
+from wfluid.kernels.step.forces import in_profile
+
+ORDERS = wp.constant(5)
+"""Powers of r that occur: 0 … 4."""
+
+MOMENTS = wp.constant(15)
+"""Pairs of powers a, b with a + b <= 4, in the order of a, then b."""
+
+
+@adjoint_lines
+def row_moments(
+    t: int,
+    f_bar: Field,
+    g_x: Field,
+    r_x: Field,
+    boxes: Indices,
+    ny: int,
+    pitch: int,
+    pitch_x: int,
+    # outputs
+    sums: Field,
+):
+    """Sums over the box's columns of F r_x^a g_x, for row t % ny and Gaussian t // ny."""
+    n = t // ny
+    j = t - n * ny
+    first = boxes[4 * n]
+    end = boxes[4 * n + 1]
+    if boxes[4 * n + 2] <= j and j < boxes[4 * n + 3]:
+        sum0 = Lane()
+        sum1 = Lane()
+        sum2 = Lane()
+        sum3 = Lane()
+        sum4 = Lane()
+        row = (j + 2) * pitch + 2
+        table = in_profile(n, 0, pitch_x)
+        whole = (end - first) // LANES * LANES + first
+        for i in range(first, whole, LANES):
+            for lane in range(LANES):
+                r = r_x[table + i + lane]
+                value = f_bar[row + i + lane] * g_x[table + i + lane]
+                sum0[lane] += value
+                sum1[lane] += value * r
+                sum2[lane] += value * r * r
+                sum3[lane] += value * r * r * r
+                sum4[lane] += value * r * r * r * r
+        for i in range(whole, end):
+            r = r_x[table + i]
+            value = f_bar[row + i] * g_x[table + i]
+            sum0[0] += value
+            sum1[0] += value * r
+            sum2[0] += value * r * r
+            sum3[0] += value * r * r * r
+            sum4[0] += value * r * r * r * r
+        at = ORDERS * t
+        sums[at] = total(sum0)
+        sums[at + 1] = total(sum1)
+        sums[at + 2] = total(sum2)
+        sums[at + 3] = total(sum3)
+        sums[at + 4] = total(sum4)
+
+
+@wp.func
+def total(part: Lane):
+    """Sum of the lanes."""
+    value = Real(0.0)
+    for lane in range(LANES):
+        value += part[lane]
+    return value
+
+
+@adjoint_lines
+def moments(
+    t: int,
+    sums: Field,
+    g_y: Field,
+    r_y: Field,
+    boxes: Indices,
+    ny: int,
+    pitch_y: int,
+    # outputs
+    out: Field,
+):
+    """The moments of Gaussian t: the sums over its rows of those along them, times r_y^b g_y."""
+    at = MOMENTS * t
+    for m in range(MOMENTS):
+        out[at + m] = Real(0.0)
+    for j in range(boxes[4 * t + 2], boxes[4 * t + 3]):
+        y = in_profile(t, j, pitch_y)
+        row = ORDERS * (t * ny + j)
+        m = at
+        for a in range(ORDERS):
+            value = sums[row + a] * g_y[y]
+            for _b in range(ORDERS - a):
+                out[m] = out[m] + value
+                value = value * r_y[y]
+                m = m + 1
+
+
+@adjoint_cells
+def lift_adjoint(
+    i: int,
+    j: int,
+    k: int,
+    u_bar: Field,
+    impulse: Uniform,
+    before: int,
+    nx: int,
+    # outputs
+    rho_bar: Field,
+):
+    """The transpose of `lift` with respect to the density; adds to it, but not to ghosts."""
+    k = inside(k)
+    both = u_bar[k] + u_bar[inside(k + before)]
+    rho_bar[k] = rho_bar[k] + wp.where(i < nx, impulse * Real(0.5) * both, Real(0.0))
+
+
+@adjoint_cells
+def mean_with_before(
+    i: int,
+    j: int,
+    k: int,
+    rho: Field,
+    before: int,
+    # outputs
+    out: Field,
+):
+    """What `lift` multiplies by its impulse: the mean on both sides of face k."""
+    k = inside(k)
+    out[k] = Real(0.5) * (rho[k] + rho[inside(k - before)])
+
+
+@adjoint_cells
+def weighted(
+    i: int,
+    j: int,
+    k: int,
+    f_bar: Field,
+    weight: Field,
+    before: int,
+    # outputs
+    out: Field,
+):
+    """The transpose of `push_weighted` with respect to what is weighted; of `weigh` with `before` = 0."""
+    k = inside(k)
+    out[k] = Real(0.5) * (weight[k] + weight[inside(k - before)]) * f_bar[k]
+
+
+@adjoint_cells
+def effort_added(
+    i: int,
+    j: int,
+    k: int,
+    f_bar: Field,
+    pushed: Field,
+    f: Field,
+    factor: Real,
+    # outputs
+    out: Field,
+):
+    """Out = f_bar + factor (pushed - f): with the gradient of half the square of what forces gained."""
+    k = inside(k)
+    out[k] = f_bar[k] + factor * (pushed[k] - f[k])

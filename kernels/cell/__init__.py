@@ -1,0 +1,1 @@
+"""How a function of one cell becomes a kernel: precision, layout, programs, strips."""

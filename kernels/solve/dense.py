@@ -1,0 +1,113 @@
+"""The coarsest level: its operator as a dense symmetric matrix, inverted in device memory.
+
+The matrix is read off the operator by applying it to unit vectors, so it is the operator, walls and
+all. Gauss-Jordan elimination without pivoting is stable for symmetric positive definite matrices. A
+pivot of zero belongs to a face on a wall, which is no unknown: it is passed over, and what comes out is
+zero there (G. Golub, C. Van Loan, Matrix Computations, 4th ed., 4.2 and the sweep operator of Goodnight,
+Amer. Statist. 33, 1979).
+"""
+
+import warp as wp
+from wfluid.kernels.cell.program import lines
+from wfluid.kernels.cell.real import Field, Real
+
+
+@wp.func
+def place(n: int, nx: int, pitch: int):
+    """Index in a field of unknown n, counted row by row."""
+    row = n // nx
+    return (row + 2) * pitch + 2 + n - row * nx
+
+
+@lines
+def unit(
+    t: int,
+    which: int,
+    nx: int,
+    pitch: int,
+    # outputs
+    x: Field,
+):
+    """X = 1 in unknown `which`, 0 elsewhere; `which` may be none of this field's."""
+    one = Real(0.0)
+    if t == which:
+        one = Real(1.0)
+    x[place(t, nx, pitch)] = one
+
+
+@lines
+def store_column(
+    t: int,
+    r: Field,
+    column: int,
+    first: int,
+    unknowns: int,
+    nx: int,
+    pitch: int,
+    shift: Real,
+    # outputs
+    matrix: Field,
+):
+    """Entry (first + t, column) of the matrix, from r = -A e; `shift` frees it of its constant."""
+    matrix[(first + t) * unknowns + column] = shift - r[place(t, nx, pitch)]
+
+
+@lines
+def eliminate(
+    t: int,
+    matrix: Field,
+    pivot: int,
+    unknowns: int,
+    # outputs
+    out: Field,
+):
+    """Row t after one elimination step; after a step for every pivot the matrix is its inverse."""
+    row = t * unknowns
+    top = pivot * unknowns
+    d = matrix[top + pivot]
+    if d <= Real(0.0):
+        for c in range(unknowns):
+            out[row + c] = matrix[row + c]
+    elif t == pivot:
+        for c in range(unknowns):
+            out[row + c] = matrix[row + c] / d
+        out[row + pivot] = Real(1.0) / d
+    else:
+        f = matrix[row + pivot] / d
+        for c in range(unknowns):
+            out[row + c] = matrix[row + c] - f * matrix[top + c]
+        out[row + pivot] = -f
+
+
+@lines
+def collect(
+    t: int,
+    f: Field,
+    first: int,
+    nx: int,
+    pitch: int,
+    # outputs
+    dense: Field,
+):
+    """The unknowns of one component, in a row, from entry `first` on."""
+    dense[first + t] = f[place(t, nx, pitch)]
+
+
+@lines
+def multiply(
+    t: int,
+    inverse: Field,
+    dense: Field,
+    first: int,
+    unknowns: int,
+    nx: int,
+    pitch: int,
+    # outputs
+    x: Field,
+):
+    """One component of x = inverse b, b collected; its rows begin at `first`."""
+    total = Real(0.0)
+    row = (first + t) * unknowns
+    for c in range(unknowns):
+        total += inverse[row + c] * dense[c]
+    x[place(t, nx, pitch)] = total

@@ -1,0 +1,170 @@
+"""Jacobi relaxation of the five-point systems: implicit diffusion and the pressure Poisson equation.
+
+Both are A x = b with, in cell or face k,
+
+    (A x)[k] = centre x[k] - ax (x[k-1] + x[k+1]) - ay (x[k-pitch] + x[k+pitch])
+
+    diffusion   (1 - dt mu Lap) v = v*   ax = dt mu / hx^2, ay = dt mu / hy^2, centre = 1 + 2 ax + 2 ay
+    pressure    -div grad q = -div v     ax = 1 / hx^2,     ay = 1 / hy^2,     centre =     2 ax + 2 ay
+
+second order in space; walls are in the ghosts of x. With face coefficients the pressure operator is
+-div (beta grad q), beta on x-faces and y-faces, the centre their weighted sum.
+
+A damped Jacobi sweep is x + w (b - A x) / centre. Two sweeps whose damping factors are the inverse
+Chebyshev roots of the spectrum they should remove beat two equal ones at the same cost (Golub & Van
+Loan, Matrix Computations, 4th ed., 11.2.8; Briggs, Henson & McCormick, A Multigrid Tutorial, ch. 2).
+"""
+
+import warp as wp
+from wfluid.kernels.cell.native import inside
+from wfluid.kernels.cell.program import cells
+from wfluid.kernels.cell.real import Field, Real, Uniform
+
+
+@wp.func
+def neighbours(x: Field, k: int, pitch: int, ax: Real, ay: Real):
+    """Ax (x_west + x_east) + ay (x_north + x_south)."""
+    north = inside(k - pitch)
+    south = inside(k + pitch)
+    return ax * (x[k - 1] + x[k + 1]) + ay * (x[north] + x[south])
+
+
+@cells
+def jacobi(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    x: Field,
+    rate: Uniform,
+    centre: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """One damped sweep: out = x + rate (b - A x), rate = w / centre."""
+    k = inside(k)
+    out[k] = x[k] + rate * (b[k] - centre * x[k] + neighbours(x, k, pitch, ax, ay))
+
+
+@cells
+def first_two_sweeps(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    own: Uniform,
+    near: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """Two damped sweeps from zero in one pass over b. The first leaves w1 b / centre, so both leave
+
+    own b + near (ax (b_west + b_east) + ay (b_north + b_south)),
+    own = (w1 + w2 - w1 w2) / centre, near = w1 w2 / centre^2.
+    """
+    k = inside(k)
+    out[k] = own * b[k] + near * neighbours(b, k, pitch, ax, ay)
+
+
+@cells
+def residual(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    x: Field,
+    centre: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    r: Field,
+):
+    """What is left: r = b - A x."""
+    k = inside(k)
+    r[k] = b[k] - centre * x[k] + neighbours(x, k, pitch, ax, ay)
+
+
+@wp.func
+def outflow(x: Field, beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
+    """-div (beta grad x): what flows out of cell k through its four faces."""
+    north = inside(k - pitch)
+    south = inside(k + pitch)
+    west_east = beta_x[k] * (x[k] - x[k - 1]) + beta_x[k + 1] * (x[k] - x[k + 1])
+    north_south = beta_y[k] * (x[k] - x[north]) + beta_y[south] * (x[k] - x[south])
+    return ax * west_east + ay * north_south
+
+
+@wp.func
+def outflow_centre(beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
+    """The diagonal of `outflow`."""
+    south = inside(k + pitch)
+    return ax * (beta_x[k] + beta_x[k + 1]) + ay * (beta_y[k] + beta_y[south])
+
+
+@cells
+def jacobi_beta(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    x: Field,
+    beta_x: Field,
+    beta_y: Field,
+    damping: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """One damped sweep of -div (beta grad x) = b."""
+    k = inside(k)
+    left = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)
+    out[k] = x[k] + damping * left / outflow_centre(beta_x, beta_y, k, pitch, ax, ay)
+
+
+@cells
+def first_sweep_beta(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    beta_x: Field,
+    beta_y: Field,
+    damping: Uniform,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    out: Field,
+):
+    """The sweep from zero: out = damping b / centre."""
+    k = inside(k)
+    out[k] = damping * b[k] / outflow_centre(beta_x, beta_y, k, pitch, ax, ay)
+
+
+@cells
+def residual_beta(
+    i: int,
+    j: int,
+    k: int,
+    b: Field,
+    x: Field,
+    beta_x: Field,
+    beta_y: Field,
+    ax: Uniform,
+    ay: Uniform,
+    pitch: int,
+    # outputs
+    r: Field,
+):
+    """r = b + div (beta grad x)."""
+    k = inside(k)
+    r[k] = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)

@@ -1,0 +1,73 @@
+"""Interpolation between cells: where a point lies, Catmull-Rom and bilinear weights."""
+
+import warp as wp
+from wfluid.kernels.cell.native import gather
+from wfluid.kernels.cell.real import Field, Real
+
+
+@wp.func
+def locate(i: int, offset: Real, n: int, periodic: int):
+    """Split position i + offset on an axis of n cells: index of the point before it, fraction past it.
+
+    Points lie at 0 … n - 1, with the ghost -1 before and n after; a wall stops the position at the
+    last interval, a periodic axis wraps the index.
+    """
+    whole = wp.floor(offset)
+    fraction = offset - whole
+    before = i + int(whole)
+    stopped = wp.min(wp.max(before, -1), n - 1)
+    stopped_fraction = wp.min(wp.max(fraction + Real(before - stopped), Real(0.0)), Real(1.0))
+    turned = i + int(whole - Real(n) * wp.floor(whole / Real(n)))
+    wrapped = wp.min(wp.max(wp.where(turned < n, turned, turned - n), 0), n - 1)
+    on_wall = periodic == 0
+    return wp.where(on_wall, stopped, wrapped), wp.where(on_wall, stopped_fraction, fraction)
+
+
+@wp.func
+def outer_weight(t: Real):
+    """Catmull-Rom weight of the point before the interval's start, t past that start."""
+    return t * (Real(-0.5) + t * (Real(1.0) - Real(0.5) * t))
+
+
+@wp.func
+def inner_weight(t: Real):
+    """Catmull-Rom weight of the interval's start, t past it."""
+    return Real(1.0) + t * t * (Real(-2.5) + Real(1.5) * t)
+
+
+@wp.func
+def weighted_row(f: Field, k: int, a: Real, b: Real, c: Real, d: Real):
+    return a * gather(f, k - 1) + b * gather(f, k) + c * gather(f, k + 1) + d * gather(f, k + 2)
+
+
+@wp.func
+def cubic(f: Field, k: int, pitch: int, tx: Real, ty: Real):
+    """Catmull-Rom interpolation of f, tx and ty past point k."""
+    sx = Real(1.0) - tx
+    sy = Real(1.0) - ty
+    a = outer_weight(tx)
+    b = inner_weight(tx)
+    c = inner_weight(sx)
+    d = outer_weight(sx)
+    return (
+        outer_weight(ty) * weighted_row(f, k - pitch, a, b, c, d)
+        + inner_weight(ty) * weighted_row(f, k, a, b, c, d)
+        + inner_weight(sy) * weighted_row(f, k + pitch, a, b, c, d)
+        + outer_weight(sy) * weighted_row(f, k + 2 * pitch, a, b, c, d)
+    )
+
+
+@wp.func
+def bilinear(f: Field, k: int, pitch: int, tx: Real, ty: Real):
+    """Bilinear interpolation of f, tx and ty past point k."""
+    north = gather(f, k) + tx * (gather(f, k + 1) - gather(f, k))
+    south = gather(f, k + pitch) + tx * (gather(f, k + pitch + 1) - gather(f, k + pitch))
+    return north + ty * (south - north)
+
+
+@wp.func
+def kept_inside(offset: Real, i: int, n: int, periodic: int):
+    """Offset from centre i that ends on the wall where it would end beyond it."""
+    middle = Real(i) + Real(0.5)
+    stopped = wp.min(wp.max(offset, -middle), Real(n) - middle)
+    return wp.where(periodic == 1, offset, stopped)

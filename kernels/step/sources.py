@@ -1,0 +1,91 @@
+"""Sources: a density poured in, and divergence prescribed to the flow.
+
+A density gains Gaussians, d rho/dt = S (Bonilla & Velho, section II). A divergence s = div v makes the
+picture grow or shrink; with r = (x - c) / sigma
+
+    s(x) = a (1 - |r|^2 / 2) exp(-|r|^2 / 2)
+
+has no integral over the plane, since it is the divergence of a (x - c) exp(-|r|^2 / 2) / 2. Both are
+sums of products of profiles along x and y (`forces`).
+"""
+
+from wfluid.kernels.cell.native import gather, inside
+from wfluid.kernels.cell.program import cells
+from wfluid.kernels.cell.real import Field, Real, Uniform
+from wfluid.kernels.step.forces import in_profile
+
+
+@cells
+def pour(
+    n: int,
+    i: int,
+    j: int,
+    k: int,
+    amount: Field,
+    centre_x: Field,
+    centre_y: Field,
+    pitch_x: int,
+    pitch_y: int,
+    # outputs
+    rho: Field,
+):
+    """Add the Gaussian n, times its amount, to the density at centre k, in place."""
+    k = inside(k)
+    g = gather(centre_x, in_profile(n, i, pitch_x)) * gather(centre_y, in_profile(n, j, pitch_y))
+    rho[k] = rho[k] + gather(amount, n) * g
+
+
+@cells
+def swell(
+    n: int,
+    i: int,
+    j: int,
+    k: int,
+    rate: Field,
+    centre_x: Field,
+    centre_y: Field,
+    r_x: Field,
+    r_y: Field,
+    pitch_x: int,
+    pitch_y: int,
+    # outputs
+    s: Field,
+):
+    """Add the divergence [1/s] of source n at centre k, in place."""
+    k = inside(k)
+    column = in_profile(n, i, pitch_x)
+    row = in_profile(n, j, pitch_y)
+    x = gather(r_x, column)
+    y = gather(r_y, row)
+    g = gather(centre_x, column) * gather(centre_y, row)
+    s[k] = s[k] + gather(rate, n) * (Real(1.0) - Real(0.5) * (x * x + y * y)) * g
+
+
+@cells
+def add_balanced(
+    i: int,
+    j: int,
+    k: int,
+    s: Field,
+    mean: Uniform,
+    # outputs
+    b: Field,
+):
+    """Add the divergence s less its mean, for which closed walls have no place, to b = -div v, in place."""
+    k = inside(k)
+    b[k] = b[k] + (s[k] - mean)
+
+
+@cells
+def pour_field(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    impulse: Uniform,
+    # outputs
+    rho: Field,
+):
+    """Add a field at centres, times the integral of its envelope [s], to the density, in place."""
+    k = inside(k)
+    rho[k] = rho[k] + impulse * f[k]

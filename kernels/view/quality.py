@@ -1,0 +1,48 @@
+"""What a frame is judged by: sums and extremes, one row a line; the host combines the rows."""
+
+import warp as wp
+from wfluid.kernels.cell.program import lines
+from wfluid.kernels.cell.real import Field, Real
+
+
+@lines
+def row_map_extremes(
+    t: int,
+    d_x: Field,
+    d_y: Field,
+    nx: int,
+    ny: int,
+    pitch: int,
+    closed_x: int,
+    closed_y: int,
+    # outputs
+    jacobian_min: Field,
+    jacobian_max: Field,
+    outside: Field,
+):
+    """Of row t of the map: least and greatest det of its Jacobian (central differences, displacement
+    in cells) and the number of cells whose source lies beyond a closed edge.
+    """
+    least = Real(1.0e30)
+    greatest = Real(-1.0e30)
+    count = Real(0.0)
+    half = Real(0.5)
+    row = (t + 2) * pitch + 2
+    for i in range(nx):
+        k = row + i
+        xx = Real(1.0) + half * (d_x[k + 1] - d_x[k - 1])
+        xy = half * (d_x[k + pitch] - d_x[k - pitch])
+        yx = half * (d_y[k + 1] - d_y[k - 1])
+        yy = Real(1.0) + half * (d_y[k + pitch] - d_y[k - pitch])
+        det = xx * yy - xy * yx
+        least = wp.min(least, det)
+        greatest = wp.max(greatest, det)
+        x = Real(i) + half + d_x[k]
+        y = Real(t) + half + d_y[k]
+        beyond_x = closed_x == 1 and (x < Real(0.0) or x > Real(nx))
+        beyond_y = closed_y == 1 and (y < Real(0.0) or y > Real(ny))
+        if beyond_x or beyond_y:
+            count += Real(1.0)
+    jacobian_min[t] = least
+    jacobian_max[t] = greatest
+    outside[t] = count

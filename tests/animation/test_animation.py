@@ -1,0 +1,173 @@
+"""Frames and steps: when, how many, what they carry."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wfluid.animation.animation import Animation, animate
+from wfluid.animation.simulation import PoorSolveWarning
+from wfluid.domain.envelopes import Arbitrary, Constant, Instantaneous
+from wfluid.domain.timeline import Timeline
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.pictures.picture import Picture
+
+PUSH = GaussianForce((0.5, 0.35), (3.0, 1.0), 0.1, Constant(0.0, 0.2))
+
+
+def checkerboard(width=64, height=48):
+    pattern = (np.arange(width) // 8 + np.arange(height)[:, None] // 8) % 2
+    return Picture(np.repeat(pattern[..., None], 3, axis=2).astype(np.float32))
+
+
+@given(st.floats(0.05, 30), st.sampled_from([12.0, 15.0, 23.976, 24.0, 25.0, 29.97, 60.0]))
+def test_frames_lie_at_whole_multiples_and_steps_hit_them(duration, fps):
+    timeline = Timeline(duration, fps)
+    assert timeline.frames == round(duration * fps) + 1
+    assert timeline.dt <= 1 / 96 + 1e-12
+    assert timeline.steps_per_frame * timeline.dt == pytest.approx(1 / fps)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((0.0, 24.0), "duration"),
+        ((float("nan"), 24.0), "duration"),
+        ((1.0, -3.0), "fps"),
+        ((1.0, 24.0, 0), "substeps"),
+        ((1e6, 24.0), "frames"),
+        ((0.001, 24.0), "frames"),
+    ],
+)
+def test_impossible_timelines_are_refused(arguments, says):
+    with pytest.raises(ValueError, match=says):
+        Timeline(*arguments)
+
+
+def test_the_first_frame_is_the_untouched_picture(device):
+    image = checkerboard()
+    first = next(animate(image, Fluid(), [PUSH], 0.5, 10, cells=32, device=device.alias))
+    np.testing.assert_array_equal(first.picture.pixels, image.pixels)
+    assert first.time == 0 and first.solve is None
+    assert np.all(first.map.displacement == 0)
+
+
+def test_frames_come_lazily_and_keep_their_own_data(device):
+    """Asking for two frames runs two; a frame does not change when the next is made."""
+    frames = animate(checkerboard(), Fluid(), [PUSH], 1e3, 10, cells=32, device=device.alias)
+    next(frames)
+    second = next(frames)
+    pixels, displacement = second.picture.pixels.copy(), second.map.displacement.copy()
+    next(frames)
+    np.testing.assert_array_equal(second.picture.pixels, pixels)
+    np.testing.assert_array_equal(second.map.displacement, displacement)
+
+
+def test_the_flow_preserves_area_and_keeps_sources_inside(device):
+    """Det J within 1 +- 2 % on this gentle push, no look-up outside, divergence near rounding."""
+    *_, last = animate(checkerboard(), Fluid(), [PUSH], 0.5, 10, cells=64, device=device.alias)
+    assert last.quality.displacement_max > 0.02
+    assert 0.98 < last.quality.jacobian_min <= last.quality.jacobian_max < 1.02
+    assert last.quality.outside_fraction == 0
+    assert last.solve.divergence < 1e-2
+    assert last.solve.pressure.relative < 1e-3
+    assert last.solve.diffusion.relative < 2e-2
+
+
+def test_the_same_animation_twice_gives_the_same_bits(device):
+    if device.is_cuda:
+        pytest.skip("atomic additions on CUDA have no fixed order")
+    runs = [list(animate(checkerboard(), Fluid(), [PUSH], 0.3, 10, cells=32, device="cpu")) for _ in range(2)]
+    for a, b in zip(*runs, strict=True):
+        np.testing.assert_array_equal(a.picture.pixels, b.picture.pixels)
+
+
+def test_a_dot_moves_with_the_arrow(device):
+    """A white dot on black, blown right and down: its centroid follows, and keeps its mass."""
+    x, y = np.arange(80), np.arange(80)[:, None]
+    dot = np.exp(-((x - 40) ** 2 + (y - 40) ** 2) / (2 * 3.0**2)).astype(np.float32)
+    blow = GaussianForce((0.506, 0.506), (0.4, 0.2), 0.2, Instantaneous(0.0))
+    *_, last = animate(Picture(dot[..., None]), Fluid(), [blow], 0.5, 10, cells=80, device=device.alias)
+    seen = last.picture.pixels[..., 0].astype(float)
+    moved = np.array([(seen * x).sum(), (seen * y).sum()]) / seen.sum() - 40
+    assert moved[0] > 3 and moved[1] > 1.5, moved
+    assert moved[1] / moved[0] == pytest.approx(0.5, abs=0.05)
+    assert seen.sum() == pytest.approx(dot.sum(), rel=0.02)
+
+
+@pytest.mark.parametrize("fps", [10, 12, 15, 23.976, 24, 25, 29.97, 30, 50, 60])
+@pytest.mark.parametrize("substeps", [None, 1, 3, 7])
+def test_a_blow_strikes_exactly_once_whenever_it_comes(fps, substeps):
+    """Steps share their edges to the bit, so no instant falls between two or into both."""
+    timeline = Timeline(2.0, fps, substeps)
+    steps = (timeline.frames - 1) * timeline.steps_per_frame
+    edges = [timeline.time_of(step) for step in range(steps + 1)]
+    for at in (*np.arange(0.0, 1.9, 0.05), *edges[:-1]):
+        blow = Instantaneous(float(at))
+        assert sum(blow.integral(a, b) for a, b in pairwise(edges)) == 1, at
+
+
+def test_a_blow_between_frames_moves_the_picture(device):
+    """At 0.6 s and 15 frames a second, where rounding once lost it."""
+    blow = GaussianForce((0.5, 0.35), (0.2, 0.0), 0.1, Instantaneous(0.6))
+    *_, last = animate(checkerboard(), Fluid(), [blow], 1.0, 15, cells=32, device=device.alias)
+    assert last.quality.displacement_max > 0.01
+
+
+def test_frames_never_share_memory(device):
+    """Not even where a row of pixels fills the device's buffer without a gap."""
+    image = Picture(np.random.default_rng(0).random((1, 40, 4)).astype(np.float32), 3)
+    frames = list(animate(image, Fluid(walls="periodic"), [PUSH], 0.3, 10, cells=32, device=device.alias))
+    for frame in frames[1:]:
+        assert not np.shares_memory(frame.picture.pixels, frames[0].picture.pixels)
+    np.testing.assert_array_equal(frames[0].picture.pixels, image.pixels)
+
+
+def test_animations_in_two_threads_do_not_meet(device):
+    def run(_):
+        *_, last = animate(checkerboard(), Fluid(), [PUSH], 0.3, 10, cells=32, device=device.alias)
+        return last.picture.pixels
+
+    with ThreadPoolExecutor(2) as pool:
+        results = list(pool.map(run, range(6)))
+    for pixels in results[1:]:
+        np.testing.assert_allclose(pixels, results[0], atol=1e-5)
+
+
+def test_a_force_that_is_not_a_number_is_refused_by_its_place(device):
+    force = GaussianForce((0.5, 0.35), (1.0, 0.0), 0.1, Arbitrary(lambda _: float("nan")))
+    with pytest.raises(ValueError, match=r"force at \(0.5, 0.35\) would add"):
+        list(animate(checkerboard(), Fluid(), [force], 0.2, 10, cells=16, device=device.alias))
+
+
+def test_a_poor_solve_warns_with_its_number_and_the_remedy(device):
+    fluid = Fluid(solver="jacobi", sweeps=2)
+    with pytest.warns(PoorSolveWarning, match=r"left .*e-0.*multigrid"):
+        list(animate(checkerboard(), fluid, [PUSH], 0.2, 10, cells=48, device=device.alias))
+
+
+def test_smaller_frames_are_filtered_not_aliased(device):
+    """A one-pixel checkerboard at half size is grey, and so it stays under a still map."""
+    image = Picture(((np.arange(64) + np.arange(64)[:, None]) % 2)[..., None].astype(np.float32))
+    frame = next(animate(image, Fluid(), [], 0.2, 10, cells=16, width=32, height=32, device=device.alias))
+    inner = frame.picture.pixels[4:-4, 4:-4]
+    assert inner.shape == (24, 24, 1)
+    np.testing.assert_allclose(inner, 0.5, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"cells": 2}, {"cells": 9000}, {"width": 0}, {"filter": "x"}, {"edge": "x"}]
+)
+def test_impossible_settings_are_refused(device, settings):
+    with pytest.raises(ValueError, match=next(iter(settings))):
+        list(animate(checkerboard(), Fluid(), [], 0.2, 10, **settings))
+
+
+def test_seconds_add_up(device):
+    animation = Animation(checkerboard(), Fluid(), (PUSH,), Timeline(0.2, 10), cells=32, device=device.alias)
+    list(animation.frames())
+    assert animation.seconds.simulate > 0 and animation.seconds.lookup > 0

@@ -1,0 +1,163 @@
+"""Loops close: periods fit, the last frame meets the first, and the seam's figures say how well."""
+
+import numpy as np
+import pytest
+
+from wfluid.animation.animation import Animation
+from wfluid.animation.loops import blows, fitted_period, frames_of, looped
+from wfluid.domain.envelopes import Constant, Fade, Oscillator
+from wfluid.domain.timeline import Timeline
+from wfluid.model.densities import Density, Source
+from wfluid.model.fluid import Fluid
+from wfluid.model.gaussian_forces import GaussianForce, VortexForce
+from wfluid.model.noise_force import NoiseForce
+from wfluid.pictures.picture import Picture
+
+SWING = Oscillator(period=0.53, phase=0.5, centred=False)
+
+
+def animation(loop, forces, device, duration=1.0, fps=15.0, cells=64, **settings):
+    pixels = np.random.default_rng(0).random((24, 32, 3)).astype(np.float32)
+    fluid = settings.pop("fluid", Fluid(viscosity=0.003))
+    return Animation(
+        Picture(pixels, None, "uint8", None),
+        fluid,
+        forces,
+        Timeline(duration, fps),
+        cells=cells,
+        loop=loop,
+        device=device.alias,
+        **settings,
+    )
+
+
+def maps(frames):
+    return np.array([frame.map.displacement for frame in frames])
+
+
+def test_periods_are_fitted_to_the_loop():
+    """The nearest period of which a whole number fills it; an oscillator's start becomes its phase."""
+    assert fitted_period(0.53, 2.0) == 0.5 and fitted_period(5.0, 2.0) == 2.0
+    force = GaussianForce(
+        (0.5, 0.5), (1, 0), 0.1, Oscillator(period=0.52, phase=0.2, start=0.1) * Fade(rise=0.3)
+    )
+    swing, fade = looped(force, 1.0).envelope.factors
+    assert (swing.period, swing.start, swing.centred) == (0.5, 0.0, False) and fade == Fade(rise=0.3)
+    whole = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
+    assert swing.value(0.3) == pytest.approx(whole.value(0.3))
+    assert looped(NoiseForce(strength=1.0, period=0.9), 2.0).period == 1.0
+
+
+def test_blows_make_velocities_swing_about_zero():
+    """A free particle under blow and force has no mean velocity over the loop, whatever the phase."""
+    for phase in (0.0, 0.1, 0.5, 0.8):
+        swing = Oscillator(period=0.5, phase=phase, centred=False)
+        (blow,) = blows([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, swing)], 1.0, 400)
+        t = np.linspace(0, 1, 4001)[:-1]
+        velocity = blow.envelope.integral(0, 1) + np.array([swing.integral(0, s) for s in t])
+        assert abs(velocity.mean()) < 1e-3 * np.abs(velocity).max(), phase
+    assert blows([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, Constant())], 1.0, 10) == []
+    cosine = Oscillator(period=0.5, phase=0.25, centred=False)
+    assert all(
+        abs(b.envelope.gain) < 1e-12 for b in blows([VortexForce((0.5, 0.5), 1.0, 0.1, cosine)], 1.0, 100)
+    )
+
+
+def test_an_oscillating_loop_comes_back_to_its_untouched_picture(device):
+    """The first frame is the picture itself; the seam's step is one like those around it."""
+    made = animation("oscillate", [GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)], device)
+    frames = list(made.frames())
+    assert len(frames) == 15 == made.frame_count
+    np.testing.assert_array_equal(frames[0].picture.pixels, made.picture.pixels)
+    shown = maps(frames)
+    steps = np.abs(np.diff(shown, axis=0)).max(axis=(1, 2, 3))
+    across = np.abs(shown[0] - shown[-1]).max()
+    assert np.abs(shown).max() > 0.004
+    assert across < 1.3 * steps.max(), (across, steps.max())
+    seam = made.seam
+    assert seam.position_max < 1e-6  # of the frame that would follow the last
+    assert seam.velocity_max / 15 < 0.5 * steps.max(), (seam, steps.max())
+    assert 0 < seam.drift_mean < seam.drift_max
+
+
+def test_without_the_drift_taken_off_the_loop_would_not_close(device, monkeypatch):
+    """What is taken off is the way that the fluid streams over the lap, and no more."""
+    force = GaussianForce((0.5, 0.4), (4.0, 1.0), 0.1, SWING)
+    made = animation("oscillate", [force], device)
+    bent = maps(made.frames())
+    import wfluid.animation.loops
+
+    monkeypatch.setattr(wfluid.animation.loops, "_bend", lambda n, frames: 0.0)
+    straight = animation("oscillate", [force], device)
+    even = maps(straight.frames())
+    assert straight.seam.drift_max == pytest.approx(made.seam.drift_max, rel=1e-6)
+    assert made.seam.velocity_max < 0.7 * straight.seam.velocity_max
+    assert np.abs(bent[7] - even[7]).max() < 1e-6  # bent near the seam only
+
+
+def test_a_pingpong_goes_back_the_way_it_came(device):
+    made = animation("pingpong", [VortexForce((0.5, 0.4), 6.0, 0.1)], device, duration=0.9)
+    frames = list(made.frames())
+    shown = maps(frames)
+    assert len(frames) == 14 == made.frame_count  # an even number of 0.9 s at 15 a second
+    for n in range(1, 7):
+        np.testing.assert_array_equal(shown[n], shown[14 - n])
+    assert made.seam.position_max == 0
+    turn = np.hypot(*np.moveaxis(2 * (shown[7] - shown[6]), -1, 0)).max() * 15
+    assert made.seam.velocity_max == pytest.approx(turn, rel=1e-4)
+
+
+def test_a_crossfade_flows_from_its_end_into_its_beginning(device):
+    """All steps are small, that across the seam too; the middle is the run itself."""
+    force = NoiseForce(strength=2.0, scale=0.4, seed=1)
+    made = animation("crossfade", [force], device)
+    shown = maps(made.frames())
+    steps = np.abs(np.diff(np.concatenate([shown, shown[:1]]), axis=0)).max(axis=(1, 2, 3))
+    assert len(shown) == 15 and steps.max() < 0.5 * np.abs(shown).max()
+    assert made.seam.position_max < 1e-6
+    plain = maps(animation(None, [force], device).frames())
+    np.testing.assert_allclose(shown[:11], plain[4:15], atol=1e-6)
+
+
+def test_densities_and_points_loop_with_the_picture(device):
+    fluid = Fluid(densities=[Density(sources=[Source((0.5, 0.4), 2.0, 0.1, Constant(0, 0.5))])])
+    force = VortexForce((0.5, 0.4), 6.0, 0.1)
+    for loop in ("pingpong", "crossfade"):
+        made = animation(loop, [force], device, fluid=fluid, points=[(0.55, 0.4)])
+        frames = list(made.frames())
+        ends = [frames[0], frames[-1]]
+        inks = np.array([frame.densities["ink"] for frame in frames])
+        step = np.abs(np.diff(inks, axis=0)).max()
+        assert np.abs(inks[0] - inks[-1]).max() <= 1.01 * step, loop
+        moved = np.abs(np.diff([frame.points[0] for frame in frames], axis=0)).max()
+        assert np.abs(ends[0].points - ends[1].points).max() <= 1.01 * moved, loop
+
+
+def test_what_is_poured_late_is_seen_in_an_oscillating_loop(device):
+    """Densities flow into their beginning towards the end; nothing is subtracted, so none is negative."""
+    source = Source((0.5, 0.4), 5.0, 0.1, Constant(0.4, 0.6))
+    fluid = Fluid(densities=[Density(sources=[source])])
+    force = GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)
+    inks = np.array(
+        [f.densities["ink"] for f in animation("oscillate", [force], device, fluid=fluid).frames()]
+    )
+    assert inks.min() >= 0 and inks.max() > 0.9
+    assert inks[0].max() == 0 and inks[-1].max() < 0.2 * inks.max()
+
+
+def test_a_loop_that_cannot_be_is_refused(device):
+    force = GaussianForce((0.5, 0.5), (1, 0), 0.1)
+    with pytest.raises(ValueError, match="expected one of oscillate, pingpong, crossfade"):
+        animation("spin", [force], device)
+    with pytest.raises(ValueError, match="no force oscillates"):
+        animation("oscillate", [force], device)
+    assert frames_of("pingpong", 1) == 2 and frames_of("crossfade", 7) == 7
+
+
+def test_a_loop_of_few_frames_runs(device):
+    """Down to one or two frames nothing breaks."""
+    swing = GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)
+    for loop in ("oscillate", "pingpong", "crossfade"):
+        for frames in (1, 2, 3):
+            made = animation(loop, [swing], device, duration=frames / 15)
+            assert len(list(made.frames())) == made.frame_count

@@ -1,0 +1,125 @@
+"""The command as people run it: in a process of its own."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from wfluid.pictures.picture import Picture
+from wfluid.pictures.stills import write_picture
+
+IMAGES = Path(__file__).parents[2] / "examples" / "images"
+REPORT = {
+    "picture", "grid", "frames", "fps", "steps", "seconds", "divergence_max", "jacobian_min", "jacobian_max",
+    "displacement_max_px", "displacement_mean_px", "outside_fraction", "versions", "device",
+}  # fmt: skip
+
+
+def wfluid(*arguments, cwd=None, timeout=120):
+    command = [sys.executable, "-m", "wfluid", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=timeout)
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A 60 x 40 picture."""
+    x = np.linspace(0, 1, 60, dtype=np.float32)
+    pixels = np.stack(
+        [np.broadcast_to(x, (40, 60)), np.broadcast_to(x[:40, None], (40, 60)), np.full((40, 60), 0.2)], 2
+    )
+    path = tmp_path / "small.png"
+    write_picture(path, Picture(pixels.astype(np.float32), dtype="uint8"))
+    return path
+
+
+def animate(small, out, *more):
+    return wfluid("animate", small, "-o", out, "--cells", 24, "--duration", 0.4, "--fps", 10, *more)
+
+
+def test_animate_writes_a_gif_and_a_report(small, tmp_path):
+    push = ("--push", "30,20:5,0:radius=8")
+    result = animate(small, tmp_path / "a.gif", *push, "--report", tmp_path / "r.json", "--quiet")
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report.keys() >= REPORT
+    assert report["seconds"].keys() == {"compile", "simulate", "lookup", "write", "total"}
+    assert (report["picture"], report["grid"], report["frames"], report["steps"]) == (
+        [60, 40],
+        [24, 16],
+        5,
+        40,
+    )
+    assert 1 < report["displacement_max_px"] < 6
+    assert 0.9 < report["jacobian_min"] <= 1 <= report["jacobian_max"] < 1.1
+    assert report["outside_fraction"] == 0
+    assert oiio.ImageInput.open(str(tmp_path / "a.gif")).seek_subimage(4, 0)
+
+
+def test_the_first_frame_of_a_sequence_is_the_picture_itself(small, tmp_path):
+    assert animate(small, tmp_path / "f.####.png", "--push", "30,20:5,0").returncode == 0
+    first, last = (oiio.ImageBuf(str(tmp_path / f"f.{n}.png")).get_pixels(oiio.UINT8) for n in (1001, 1005))
+    np.testing.assert_array_equal(first, oiio.ImageBuf(str(small)).get_pixels(oiio.UINT8))
+    assert np.abs(last.astype(int) - first).max() > 3
+
+
+def test_the_same_command_twice_gives_the_same_bytes(small, tmp_path):
+    for name in ("a", "b"):
+        assert animate(small, tmp_path / f"{name}.gif", "--push", "30,20:5,2:period=0.4").returncode == 0
+    assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
+
+
+@pytest.mark.parametrize("scheme", ["standard", "paper"])
+@pytest.mark.parametrize("walls", ["free-slip", "no-slip", "periodic", "periodic,free-slip"])
+def test_every_wall_and_scheme_runs(small, tmp_path, walls, scheme):
+    options = ("--walls", walls, "--scheme", scheme, "--push", "30,20:5,2", "--width", 30)
+    result = animate(small, tmp_path / "f.####.png", *options)
+    assert result.returncode == 0, result.stderr
+
+
+def test_warmup_says_what_it_did():
+    result = wfluid("warmup")
+    assert result.returncode == 0 and result.stderr.startswith("kernels for CPU")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ((), "at least one --push"),
+        (("--push", "1,2"), "expected X,Y:DX,DY"),
+        (("--push", "999,2:1,1"), "outside the picture"),
+        (("--push", "1,2:1,1", "--viscosity", "-1"), "--viscosity -1.0: expected a number from 0 to 1000"),
+        (("--push", "1,2:1,1", "--viscosity", "nan"), "--viscosity nan: expected"),
+        (("--push", "1,2:1,1", "--viscosity", "thick"), "invalid float value"),
+        (("--push", "1,2:1,1", "--walls", "soft"), "expected free-slip"),
+        (("--push", "1,2:1,1", "--scheme", "best"), "expected one of standard, paper"),
+        (("--push", "1,2:1,1", "--solver", "lu"), "expected one of multigrid, jacobi"),
+        (("--push", "1,2:1,1", "--fps", "0"), "--fps 0.0: expected a number from 0.01"),
+        (("--push", "1,2:1,1", "--duration", "inf"), "--duration inf"),
+        (("--push", "1,2:1,1", "--substeps", "0"), "--substeps 0"),
+        (("--push", "1,2:1,1", "--cells", "1"), "cells 1"),
+        (("--push", "1,2:1,1", "--width", "-4"), "width -4"),
+        (("--push", "1,2:1,1", "--device", "tpu"), "there is: cpu"),
+        (("--push", "1,2:1,1", "--sharpen"), "there is no flag --sharpen"),
+    ],
+)
+def test_bad_input_is_one_line_exit_2_and_nothing_written(small, tmp_path, options, says):
+    out = tmp_path / "out"
+    out.mkdir()
+    result = wfluid("animate", small, "-o", out / "a.gif", *options)
+    assert result.returncode == 2, result.stderr
+    assert says in result.stderr and result.stderr.count("\n") == 1
+    assert "Traceback" not in result.stderr and list(out.iterdir()) == []
+
+
+def test_help_loads_neither_warp_nor_openimageio():
+    heavy = ("warp", "OpenImageIO", "numpy", "rich")
+    code = (
+        f"import sys, wfluid.cli.main as c; c.build_parser(); print([m for m in {heavy} if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.stdout.strip() == "[]"
+    assert wfluid("--help").returncode == 0

@@ -1,0 +1,117 @@
+"""Two pictures of one kind mixed: of light, or of the numbers that a display is sent."""
+
+import numpy as np
+import pytest
+
+from wfluid import Picture
+from wfluid.pictures.blend import LIGHTS, blended, check_light
+
+HALF_GREY = ((0.5 + 0.055) / 1.055) ** 2.4
+"""The light of sRGB's 0.5, by its definition (IEC 61966-2-1)."""
+
+
+def noise(seed, channels=3, alpha=None):
+    """Colours within 0.1 … 0.9 of their alpha, which is within 0.2 … 1."""
+    rng = np.random.default_rng(seed)
+    pixels = rng.uniform(0.1, 0.9, (6, 9, channels)).astype(np.float32)
+    if alpha is not None:
+        pixels[..., alpha] = 1
+        pixels *= rng.uniform(0.2, 1, (6, 9, 1)).astype(np.float32)
+    return Picture(pixels, alpha=alpha)
+
+
+def shown(light):
+    """sRGB of light, by its definition, in double precision."""
+    light = np.asarray(light, np.float64)
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def flat(value, channels=3, **settings):
+    return Picture(np.full((2, 3, channels), value, np.float32), **settings)
+
+
+@pytest.mark.parametrize("alpha", [None, 3])
+def test_light_is_mixed_by_parts(alpha):
+    """(1 - w) a + w b, of premultiplied colours and of alpha alike."""
+    a, b = noise(0, 4, alpha), noise(1, 4, alpha)
+    for weight in (0.25, 0.7):
+        wanted = (1 - weight) * a.pixels.astype(float) + weight * b.pixels.astype(float)
+        np.testing.assert_allclose(blended(a, b, weight).pixels, wanted, rtol=0, atol=2e-7)
+
+
+def test_black_and_white_are_half_of_the_light_or_half_of_the_code():
+    black, white = flat(0), flat(1)
+    np.testing.assert_allclose(blended(black, white, 0.5, "linear").pixels, 0.5, rtol=1e-6)
+    np.testing.assert_allclose(blended(black, white, 0.5, "display").pixels, HALF_GREY, rtol=1e-6)
+
+
+def test_display_values_are_mixed_by_parts():
+    a, b = noise(0), noise(1)
+    mixed = shown(blended(a, b, 0.3, "display").pixels)
+    np.testing.assert_allclose(mixed, 0.7 * shown(a.pixels) + 0.3 * shown(b.pixels), rtol=0, atol=1e-6)
+
+
+def test_display_values_are_those_of_what_is_not_multiplied_and_alpha_is_mixed_as_it_is():
+    """A transparent white and an opaque black: codes, each by its alpha, as a display's compositor does."""
+    a, b = noise(0, 4, 3), noise(1, 4, 3)
+    mixed = blended(a, b, 0.3, "display").pixels.astype(float)
+    codes = [shown(one.pixels[..., :3] / one.pixels[..., 3:]) * one.pixels[..., 3:] for one in (a, b)]
+    alpha = 0.7 * a.pixels[..., 3] + 0.3 * b.pixels[..., 3]
+    np.testing.assert_allclose(mixed[..., 3], alpha, atol=1e-6)
+    np.testing.assert_allclose(
+        shown(mixed[..., :3] / alpha[..., None]) * alpha[..., None],
+        0.7 * codes[0] + 0.3 * codes[1],
+        atol=2e-6,
+    )
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_what_is_transparent_gives_no_colour(light):
+    """A clear pixel fades the other's alpha and leaves its colour."""
+    clear, red = np.zeros((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32)
+    red[..., [0, 3]] = 1
+    mixed = blended(Picture(clear, alpha=3), Picture(red, alpha=3), 0.25, light).pixels
+    np.testing.assert_allclose(mixed, red * 0.25, atol=1e-6)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("alpha", [None, 3])
+def test_none_or_all_of_it_is_the_picture_to_the_bit(light, alpha):
+    a, b = noise(0, 4, alpha), noise(1, 4, alpha)
+    for zero, one in ((0, 1), (0.0, 1.0), (np.zeros((6, 9)), np.ones((6, 9)))):
+        np.testing.assert_array_equal(blended(a, b, zero, light).pixels, a.pixels)
+        np.testing.assert_array_equal(blended(a, b, one, light).pixels, b.pixels)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_every_pixel_has_its_own_weight(light):
+    """As if each were blended alone."""
+    a, b, weight = noise(0), noise(1), np.random.default_rng(2).random((6, 9))
+    weight[0, :2] = 0, 1
+    mixed = blended(a, b, weight, light).pixels
+    for row, column in np.ndindex(weight.shape):
+        alone = blended(a, b, float(weight[row, column]), light).pixels[row, column]
+        np.testing.assert_allclose(mixed[row, column], alone, rtol=0, atol=1e-6)
+
+
+def test_both_lights_agree_where_the_pictures_do():
+    """To the accuracy of the transfer function and its inverse in single precision."""
+    a = noise(0)
+    for light in LIGHTS:
+        np.testing.assert_allclose(blended(a, a, 0.37, light).pixels, a.pixels, rtol=2e-6)
+
+
+def test_numbers_that_are_no_colours_know_no_display():
+    a, b = flat(0.0, data=True), flat(1.0, data=True)
+    np.testing.assert_allclose(blended(a, b, 0.5, "display").pixels, 0.5, rtol=1e-6)
+
+
+def test_a_mix_is_of_the_first_pictures_kind():
+    a, b = flat(0.2, dtype="uint8"), flat(0.4, dtype="half")
+    for weight in (0, 0.5, 1):
+        assert blended(a, b, weight).dtype == "uint8"
+
+
+def test_a_light_that_does_not_exist_is_refused():
+    with pytest.raises(ValueError, match="blend in 'gamma' light: expected one of linear, display"):
+        check_light("gamma")

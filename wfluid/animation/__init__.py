@@ -1,0 +1,1 @@
+"""From a fluid and its forces to frames."""

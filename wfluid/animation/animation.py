@@ -1,0 +1,179 @@
+"""Animations: frames of a picture carried by the fluid, one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from wfluid.animation.frame import Frame, Seconds
+from wfluid.animation.loops import Seam, check_loop, frames_of, looped, looping
+from wfluid.animation.simulation import Moment, Runner
+from wfluid.domain.grid import LEAST_CELLS, Grid
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.device import open_device
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import Force, Group, flat
+from wfluid.pictures.picture import Picture
+from wfluid.pictures.sampling import check_look_up
+from wfluid.step.solver import Solver
+from wfluid.view.coordinate_map import CoordinateMap
+from wfluid.view.densities import show_densities
+from wfluid.view.lookup import LookUp
+from wfluid.view.quality import measure_map
+
+CELLS_LIMIT = 8192
+"""Most cells along the longer side: indices are 32-bit."""
+
+SIZE_LIMIT = 32768
+"""Longest side of a frame [px]."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A picture, a fluid, forces and a timeline; iterate over `frames()` to run it.
+
+    Nothing is computed before the first frame is asked for, and no frame is kept.
+    """
+
+    picture: Picture
+    """What is animated."""
+    fluid: Fluid
+    """What it is made of."""
+    forces: Sequence[Force | Group]
+    """What moves it."""
+    timeline: Timeline
+    """When frames are shown, and how many steps lie between."""
+    cells: int = 256
+    """Cells of the grid along the picture's longer side."""
+    width: int | None = None
+    """Width of the frames [px]; the picture's by default."""
+    height: int | None = None
+    """Height of the frames [px]; the picture's by default."""
+    filter: str = "cubic"
+    """How the picture is read between pixels: "nearest", "bilinear", "cubic"."""
+    edge: str = "clamp"
+    """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
+    device: str | None = None
+    """"cpu" (default), "cuda", "cuda:1", …"""
+    layers: Mapping[str, Picture] = field(default_factory=dict)
+    """Further pictures and mattes that go through the same map, stretched over the picture, by name."""
+    points: Sequence[tuple[float, float]] = ()
+    """Places x, y of the picture [longer side] that are followed."""
+    loop: str | None = None
+    """"oscillate", "pingpong" or "crossfade": the frames follow one another without end."""
+    seam: Seam = field(default_factory=Seam, compare=False)
+    """How well the loop's end meets its beginning, filled in when all frames are made."""
+    seconds: Seconds = field(default_factory=Seconds, compare=False)
+    """Where the time went, filled in while frames are made."""
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if size is not None and not 1 <= size <= SIZE_LIMIT:
+                raise ValueError(f"{name} {size}: expected 1 … {SIZE_LIMIT} pixels")
+        check_look_up(self.filter, self.edge)
+        if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
+            raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
+        forces = flat(self.forces)
+        if self.loop is not None:
+            check_loop(self.loop, forces)
+            forces = tuple(looped(force, self._loop_frames / self.timeline.fps) for force in forces)
+        object.__setattr__(self, "_acting", forces)
+
+    @property
+    def _loop_frames(self) -> int:
+        return frames_of(self.loop, self.timeline.frames - 1)
+
+    @property
+    def frame_count(self) -> int:
+        """Frames shown: both ends included, but for the last of a loop, which is the first."""
+        return self.timeline.frames if self.loop is None else self._loop_frames
+
+    @property
+    def grid(self) -> Grid:
+        """The fluid's grid."""
+        return Grid.for_picture(self.picture.width, self.picture.height, self.cells)
+
+    @cached_property
+    def solver(self) -> Solver:
+        """The solver; asking for it opens the device and loads the kernels."""
+        solver = Solver(self.grid, self.fluid, open_device(self.device))
+        self.seconds.compile = solver.compile_seconds
+        return solver
+
+    def _moments(self) -> Iterator[Moment]:
+        """The fluid at every frame."""
+        runner = Runner(self.solver, self.timeline, self.points)
+        if self.loop is None:
+            return runner.moments(self._acting, self.timeline.frames - 1)
+        return looping(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
+
+    def look_up(self, picture: Picture) -> LookUp:
+        """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
+        width, height = self.width or self.picture.width, self.height or self.picture.height
+        return LookUp(
+            picture.shrunk(width, height),
+            self.grid,
+            self.fluid.walls,
+            self.solver.device,
+            width=width,
+            height=height,
+            filter=self.filter,
+            edge=self.edge,
+        )
+
+    def frames(self) -> Iterator[Frame]:
+        """Run the animation from rest, one frame at a time."""
+        clock, walls = time.perf_counter, self.fluid.walls
+        shown = self.look_up(self.picture)
+        layers = {name: self.look_up(layer) for name, layer in self.layers.items()}
+        moments = self._moments()
+        for index in range(self.frame_count):
+            began = clock()
+            moment = next(moments)
+            state = moment.state
+            quality, warp = measure_map(state, walls), CoordinateMap.of_state(state, walls)
+            simulated = clock()
+            still = quality.displacement_max == 0
+            picture, *others = (
+                look_up.untouched if still else look_up.render(state.d_x, state.d_y)
+                for look_up in (shown, *layers.values())
+            )
+            densities = state.densities
+            picture = show_densities(picture, self.fluid.densities, densities, walls.periodic)
+            self.seconds.simulate += simulated - began
+            self.seconds.lookup += clock() - simulated
+            yield Frame(
+                index,
+                index / self.timeline.fps,
+                picture,
+                warp,
+                quality,
+                moment.solve,
+                dict(zip(layers, others, strict=True)),
+                dict(zip(self.fluid.density_names, densities, strict=True)),
+                state.points,
+            )
+        next(moments, None)  # what a loop measures when it is through
+
+
+def animate(
+    picture: Picture,
+    fluid: Fluid,
+    forces: Sequence[Force | Group],
+    duration: float,
+    fps: float = 24.0,
+    substeps: int | None = None,
+    **settings,
+) -> Iterator[Frame]:
+    """Frames of `picture` moved by `forces` for `duration` seconds, made as they are asked for.
+
+    `settings` are those of `Animation`: cells, width, height, filter, edge, device, layers, points, loop.
+
+    Raises:
+        ValueError: a value outside its range; the message names it and the range.
+    """
+    timeline = Timeline(duration, fps, substeps)
+    return Animation(picture, fluid, tuple(forces), timeline, **settings).frames()

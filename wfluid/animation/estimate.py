@@ -1,0 +1,94 @@
+"""What an animation will take, before it is run.
+
+Memory follows from the arrays it makes, time from figures measured on one core of a 2 GHz server CPU.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wfluid.animation.animation import Animation
+from wfluid.system.memory import free_memory, readable_size
+
+FIELDS, COUPLED_FIELDS = 77, 114
+"""Fields of the finest grid that a solver, two states and their hierarchies hold, by kind of diffusion."""
+
+FIELDS_PER_PIXEL = 3
+"""Fields of the frames' size: two coordinates and what is being copied out."""
+
+SECONDS_PER_CELL_STEP, COUPLED_SECONDS = 100e-9, 400e-9
+SECONDS_PER_PIXEL = 40e-9
+
+QUEUED_FRAMES = 6
+"""Frames in flight between computing and writing."""
+
+PROGRAM = 240e6
+"""Bytes that Python and the libraries take before the first array."""
+
+DENSITY_FIELDS = 15
+"""Fields that a density takes, where it diffuses."""
+
+LOOP_FRAMES = {"oscillate": (1.0, 2.0), "pingpong": (0.5, 0.5), "crossfade": (0.25, 1.25)}
+"""By kind of loop: the part of its frames that are kept, and that are run."""
+
+FIELDS_A_STEP = 6
+"""Of a morph's flow: a velocity, and two maps of two components."""
+
+_REAL = 4
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a run takes, roughly."""
+
+    memory: float
+    """Bytes at the peak."""
+    seconds: float
+    """Time without compiling and writing."""
+
+
+def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> Estimate:
+    """Memory and time of an animation from its sizes alone, or of a morph shown in so many frames.
+
+    `frames_kept` is how many outputs hold every frame until the last: a GIF's palette needs them all.
+    """
+    grid, picture = animation.grid, animation.picture
+    width, height = animation.width or picture.width, animation.height or picture.height
+    apart = animation.fluid.separable
+    channels = -(-picture.pixels.shape[2] // 4) * 4
+    memory = _REAL * (
+        (FIELDS if apart else COUPLED_FIELDS) * grid.nx * grid.ny
+        + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
+        + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
+    )
+    frames = morph_frames or animation.frame_count
+    shown = 2 if morph_frames else 1 + len(animation.layers)
+    memory += (shown - 1) * _REAL * (channels + FIELDS_PER_PIXEL + channels * QUEUED_FRAMES) * width * height
+    densities = len(animation.fluid.densities)
+    memory += _REAL * grid.nx * grid.ny * (DENSITY_FIELDS * densities)
+    if morph_frames:
+        memory += _REAL * grid.nx * grid.ny * FIELDS_A_STEP * animation.timeline.steps
+    kept, run = LOOP_FRAMES.get(animation.loop, (0.0, 1.0))
+    memory += _REAL * grid.nx * grid.ny * (2 + densities) * kept * frames
+    memory += PROGRAM + frames_kept * 3 * frames * width * height
+    steps = round(run * (frames - (animation.loop is None)) * animation.timeline.steps_per_frame)
+    steps = 2 * animation.timeline.steps if morph_frames else steps
+    seconds = steps * grid.nx * grid.ny * (SECONDS_PER_CELL_STEP if apart else COUPLED_SECONDS)
+    seconds += shown * frames * width * height * SECONDS_PER_PIXEL
+    return Estimate(memory, seconds)
+
+
+def check_memory(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> None:
+    """Refuse an animation that will not fit.
+
+    Raises:
+        ValueError: with what it needs and what there is.
+    """
+    need, there = estimate(animation, frames_kept, morph_frames).memory, free_memory()
+    if need > there:
+        raise ValueError(
+            f"{animation.grid.nx} x {animation.grid.ny} cells and {animation.frame_count} frames "
+            f"{animation.width or animation.picture.width} pixels wide need about {readable_size(need)} of "
+            f"memory, {readable_size(there)} are free; lower --cells or --width"
+            + (", or write a movie or a sequence instead of a GIF" if frames_kept else "")
+        )

@@ -1,0 +1,112 @@
+"""Runs a solver frame by frame, and judges what its solves left."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.state import State
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import Force
+from wfluid.solve.system import conjugate_gradients
+from wfluid.step.solver import Solver, SolveReport
+
+POOR_RESIDUAL = 0.02
+"""Relative residual of the projection above which a frame warns."""
+
+
+class PoorSolveWarning(UserWarning):
+    """A solve left more than it should; the message has the number and the remedy."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The fluid at one frame."""
+
+    state: State
+    """What it is; written over as the run goes on."""
+    solve: SolveReport | None
+    """What the last step's solves left; None where no step led here."""
+
+
+class Runner:
+    """Steps a fluid from frame to frame, from rest on."""
+
+    def __init__(self, solver: Solver, timeline: Timeline, points: np.ndarray | Sequence = ()):
+        self.solver, self.timeline, self._points = solver, timeline, points
+        self.now, self.spare = solver.rest(points), solver.rest(points)
+        self._warned = False
+
+    now: State
+    """The fluid as it is."""
+    spare: State
+    """A state that the next step writes over."""
+
+    def moments(self, forces: Sequence[Force], frames: int, first: Sequence[Force] = ()) -> Iterator[Moment]:
+        """The fluid as it is, and then after each of so many frames; the forces' time begins at 0.
+
+        The forces `first` act in the first step too.
+        """
+        yield Moment(self.now, None)
+        per_frame, timeline = self.timeline.steps_per_frame, self.timeline
+        for index in range(1, frames + 1):
+            for step in range((index - 1) * per_frame, index * per_frame):
+                acting = [*forces, *first] if step == 0 else forces
+                start, end = timeline.time_of(step), timeline.time_of(step + 1)
+                self.solver.step(self.now, self.spare, acting, start, timeline.dt, until=end)
+                self.now, self.spare = self.spare, self.now
+            solve = self.solver.report()
+            self._warned = _judge(solve, self.solver.fluid, index, self._warned)
+            yield Moment(self.now, solve)
+
+    def untouch(self) -> None:
+        """Let the picture, densities and points be as at rest; the flow goes on."""
+        rest, now = self.solver.rest(self._points), self.now
+        pairs = [(now.d_x, rest.d_x), (now.d_y, rest.d_y), (now.p_x, rest.p_x), (now.p_y, rest.p_y)]
+        for array, values in [*pairs, *zip(now.rho, rest.rho, strict=True)]:
+            wp.copy(array, values)
+
+
+def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
+    """Stop where the fluid is no longer finite; warn once of a projection that left too much.
+
+    The paper's own scheme is not warned of: few Jacobi sweeps are part of it.
+    """
+    pressure = solve.pressure
+    if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
+        raise FloatingPointError(
+            f"frame {index}: the velocity is no longer finite; use smaller forces or steps"
+        )
+    if warned or fluid.scheme == "paper":
+        return warned
+    text = _poor(solve, fluid)
+    if text:
+        warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
+    return bool(text)
+
+
+def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
+    """What a step's solves left too much of, with the remedy; None if nothing."""
+    pressure, diffusion = solve.pressure, solve.diffusion
+    if pressure.relative > POOR_RESIDUAL:
+        left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"
+        if pressure.method == "multigrid":
+            more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
+            return f"{left} cycles; {more}"
+        if pressure.method == "jacobi":
+            return f"{left} sweeps; set solver (--solver) to multigrid"
+        return f"{left} iterations; soften the edges of the freeze mask"
+    most = conjugate_gradients(fluid.diffusion_tolerance).iterations
+    if diffusion.method == "conjugate gradients" and diffusion.iterations == most:
+        return (
+            f"the diffusion left {diffusion.relative:.1e} of its change after "
+            f"{diffusion.iterations} iterations; "
+            "lower the contrast of the viscosity, soften its edges, or use more substeps"
+        )
+    return None

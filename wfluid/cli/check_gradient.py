@@ -1,0 +1,109 @@
+"""wfluid check-gradient: Taylor's test of the gradients of a scene, in double precision."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+
+from wfluid.animation.animation import Animation
+from wfluid.domain.grid import Grid
+from wfluid.gradient.functional import Functional
+from wfluid.gradient.objectives import Objective, ParticleMisfit, Sum
+from wfluid.gradient.state_objectives import DensityMisfit, MapMisfit
+from wfluid.gradient.taylor import LEAST_RATE, taylor_rates
+from wfluid.gradient.variables import POSITIVE, VELOCITY, VISCOSITY, Free, Setup, known_names
+from wfluid.kernels.cell.real import Real
+from wfluid.keyframes.keyframes import ParticleKeyframe
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import flat
+from wfluid.scene.scene import Scene
+from wfluid.staging.aims import Aims
+from wfluid.staging.build import stage_all
+
+TIGHT = 1e-12
+"""Tolerance of the solves, so that the gradient with respect to viscosity is exact too."""
+
+DENSITY_WEIGHT = 1e-3
+"""Of a density's square beside the displacement's, which is as small."""
+
+EXIT_WRONG = 1
+
+
+def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
+    """Test every number of a scene that has a gradient; print a table; 1 if one is wrong, else 0.
+
+    The objective is the misfit of its keyframes, if it has some; else the mean square of the displacement,
+    and of densities, at the end. Forces that were found for its keyframes act too.
+
+    Raises:
+        ValueError: a scene that has nothing to vary, or that cannot run.
+    """
+    staged = stage_all(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
+    animation, aims = staged.animation, staged.aims
+    functional = _functional(replace(animation, cells=cells), aims)
+    grid, steps = functional.grid, functional.timeline.steps
+    seen = "mean square of " + " and ".join(["the displacement", *animation.fluid.density_names])
+    if aims:
+        seen = f"misfit of {len(aims.keyframes)} keyframes"
+    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: {seen}")
+    print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
+    wrong = 0
+    for rate in taylor_rates(functional, seed=seed):
+        shown = f"{rate.rate:.3f}"
+        if not np.isfinite(rate.rate):
+            shown = "linear" if np.isinf(rate.rate) else "unseen"
+        verdict = "" if rate.holds else f"  below {LEAST_RATE}"
+        numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>6s}"
+        print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
+        wrong += not rate.holds
+    return EXIT_WRONG if wrong else 0
+
+
+def _functional(animation: Animation, aims: Aims | None) -> Functional:
+    """A functional of everything in an animation that can vary."""
+    grid, timeline, device = animation.grid, animation.timeline, animation.device
+    fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
+    found = aims.found if aims else ()
+    setup = Setup(fluid, (*flat(animation.forces), *found), np.zeros((2, grid.ny, grid.nx)))
+    names = [name for name in known_names(setup) if not _held(name, setup)]
+    free = [Free(name, _scale(name, setup)) for name in names]
+    objective = _misfit(aims) if aims else _objective(grid, fluid, timeline.end)
+    return Functional(grid, fluid, setup.forces, timeline, objective, free, device=device)
+
+
+def _misfit(aims: Aims) -> Objective:
+    """The misfits of keyframes and pins."""
+    pins = [ParticleKeyframe(pin, pin, max(one.time for one in aims.keyframes)) for pin in aims.pins]
+    return Sum(
+        tuple(
+            (one.weight, ParticleMisfit([one.point], [one.destination], one.time))
+            for one in (*aims.keyframes, *pins)
+        )
+    )
+
+
+def _objective(grid: Grid, fluid: Fluid, end: float) -> Objective:
+    """The mean square of the displacement at the end, and of every density."""
+    mean, none = 2 / (grid.width * grid.height), np.zeros((grid.ny, grid.nx))
+    total: Objective = mean * MapMisfit(np.stack([none, none]), end)
+    for name in fluid.density_names:
+        total += DENSITY_WEIGHT * mean * DensityMisfit(name, none, end)
+    return total
+
+
+def _held(name: str, setup: Setup) -> bool:
+    """What is not tested: a viscosity of 0, or one that sweeps solve for, has no gradient to rely on."""
+    if name != VISCOSITY:
+        return False
+    none = isinstance(setup.fluid.viscosity, float) and setup.fluid.viscosity == 0
+    return none or setup.fluid.solver == "jacobi"
+
+
+def _scale(name: str, setup: Setup) -> float:
+    """About how large the numbers are, for steps in proportion."""
+    if name.rpartition(".")[2] in POSITIVE or name == VELOCITY:
+        return 1.0
+    values = np.abs(np.asarray(setup.number(name), dtype=np.float64))
+    return float(values.max()) or 1.0

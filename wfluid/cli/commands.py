@@ -1,0 +1,64 @@
+"""What each command does with its parsed flags."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+
+
+def run_warmup(options: argparse.Namespace) -> int:
+    """Compile the kernels."""
+    from wfluid.fields.device import load_kernels, open_device
+    from wfluid.kernels.cell.program import ADJOINT
+
+    device = open_device(options.device)
+    seconds = load_kernels(device) + load_kernels(device, ADJOINT)
+    if not options.quiet:
+        print(f"kernels for {device.name}: {seconds:.1f} s", file=sys.stderr)
+    return 0
+
+
+def run_animate(options: argparse.Namespace) -> int:
+    """Make the scene of the flags and run it."""
+    from wfluid.cli.options import scene_of
+
+    return _run(scene_of(options), options)
+
+
+def run_render(options: argparse.Namespace) -> int:
+    """Read a scene, set what is set, and run it."""
+    from wfluid.scene.toml_file import read_scene
+
+    scene = read_scene(options.scene).with_values(options.set)
+    return _run(scene.writing(options.output, options.report), options)
+
+
+def run_check_gradient(options: argparse.Namespace) -> int:
+    """Test the gradients of a scene; in a process of its own where this one is not in double precision."""
+    double = {"WFLUID_PRECISION": "float64"}
+    if os.environ.get("WFLUID_PRECISION") != double["WFLUID_PRECISION"]:
+        command = [sys.executable, "-m", "wfluid", *options.arguments]
+        return subprocess.call(command, env={**os.environ, **double})
+    from wfluid.cli.check_gradient import check_gradient
+    from wfluid.scene.toml_file import read_scene
+
+    if options.seed < 0:
+        raise ValueError(f"--seed {options.seed}: expected a whole number from 0 on")
+    scene = read_scene(options.scene).with_values(options.set)
+    return check_gradient(scene, options.cells, options.device, options.seed)
+
+
+def _run(scene, options: argparse.Namespace) -> int:
+    from wfluid.cli.render import Run, run_scene
+
+    how = Run(
+        device=options.device,
+        quiet=options.quiet,
+        dry_run=options.dry_run,
+        preview=options.preview,
+        save_scene=getattr(options, "save_scene", None),
+        plot=getattr(options, "plot", None),
+    )
+    return run_scene(scene, how)

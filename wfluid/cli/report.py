@@ -1,0 +1,272 @@
+"""The report of a run: one JSON object with settings, times and the extremes over all frames."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wfluid.animation.animation import Animation
+from wfluid.animation.frame import Frame
+from wfluid.keyframes.match import Match
+from wfluid.model.force import Force, flat
+from wfluid.model.painted import Keyed, Painted, Quantity
+from wfluid.morphing.frame import MorphFrame
+from wfluid.morphing.morph import Morph
+from wfluid.pictures.formats import PictureError
+from wfluid.solve.system import Residual
+from wfluid.system.atomic import whole_file
+
+
+@dataclass
+class Report:
+    """Collects what the frames of an animation say of themselves."""
+
+    animation: Animation
+    """What is run."""
+    match: Match | None = None
+    """What the search for its keyframes came to."""
+    side: float = 1.0
+    """The longer side in the pixels that keyframes are given in."""
+    morph: Morph | None = None
+    """The morph that the animation is the flow of."""
+    frames: int = 0
+    """Frames seen."""
+    extremes: dict[str, float] = field(
+        default_factory=lambda: {
+            "divergence_max": 0.0,
+            "jacobian_min": math.inf,
+            "jacobian_max": -math.inf,
+            "displacement_max_px": 0.0,
+            "displacement_mean_px": 0.0,
+            "outside_fraction": 0.0,
+            "divergence_prescribed_max": 0.0,
+            "divergence_removed_max": 0.0,
+        }
+    )
+    """Over all frames; the mean displacement is that of the frame where it is largest."""
+    solves: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Of projection and diffusion: the methods used, most iterations and largest residuals seen."""
+
+    of_b: list[float] = field(default_factory=lambda: [math.inf, -math.inf])
+    """Least and greatest det J of the map of a morph's second picture."""
+
+    def add(self, frame: Frame) -> None:
+        """Take a frame's figures."""
+        side = max(self.animation.picture.width, self.animation.picture.height)
+        seen, quality = self.extremes, frame.quality
+        self.frames += 1
+        seen["jacobian_min"] = min(seen["jacobian_min"], quality.jacobian_min)
+        seen["jacobian_max"] = max(seen["jacobian_max"], quality.jacobian_max)
+        for name, value in (
+            ("displacement_max_px", quality.displacement_max * side),
+            ("displacement_mean_px", quality.displacement_mean * side),
+            ("outside_fraction", quality.outside_fraction),
+            ("divergence_max", frame.solve.divergence if frame.solve else 0.0),
+            ("divergence_prescribed_max", frame.solve.prescribed if frame.solve else 0.0),
+            ("divergence_removed_max", abs(frame.solve.removed) if frame.solve else 0.0),
+        ):
+            seen[name] = max(seen[name], value)
+        if isinstance(frame, MorphFrame):
+            self.of_b[0] = min(self.of_b[0], frame.to_quality.jacobian_min)
+            self.of_b[1] = max(self.of_b[1], frame.to_quality.jacobian_max)
+        if frame.solve:
+            self._add_solve("projection", frame.solve.pressure)
+            self._add_solve("diffusion", frame.solve.diffusion)
+
+    def _add_solve(self, name: str, left: Residual) -> None:
+        blank = {"methods": [], "iterations_max": 0, "residual_max": 0.0, "backward_error_max": 0.0}
+        seen = self.solves.setdefault(name, blank)
+        if left.method not in seen["methods"]:
+            seen["methods"].append(left.method)
+        for key, value in (
+            ("iterations_max", left.iterations),
+            ("residual_max", left.relative),
+            ("backward_error_max", left.backward),
+        ):
+            seen[key] = max(seen[key], value)
+
+    @property
+    def _steps(self) -> int:
+        timeline = self.animation.timeline
+        return timeline.steps if self.morph else max(self.frames - 1, 0) * timeline.steps_per_frame
+
+    def _loop(self) -> dict[str, Any]:
+        """What the loop's seam measures, where there is one."""
+        animation, seam = self.animation, self.animation.seam
+        if animation.loop is None:
+            return {}
+        side = max(animation.picture.width, animation.picture.height)
+        a_frame = side / animation.timeline.fps
+        return {
+            "loop": {
+                "kind": animation.loop,
+                "position_gap_px": {"max": seam.position_max * side, "mean": seam.position_mean * side},
+                "velocity_gap_px_per_frame": {
+                    "max": seam.velocity_max * a_frame,
+                    "mean": seam.velocity_mean * a_frame,
+                },
+                "drift_removed_px": {"max": seam.drift_max * side, "mean": seam.drift_mean * side},
+            }
+        }
+
+    def _keyframes(self) -> dict[str, Any]:
+        """What the search for keyframes came to; a residual is the larger of the particle's and the map's."""
+        match, side = self.match, self.side
+        if match is None:
+            return {}
+        residuals = [arrival.residual * side for arrival in match.arrivals]
+        return {
+            "keyframes": [
+                {
+                    "from": [value * side for value in arrival.keyframe.point],
+                    "to": [value * side for value in arrival.keyframe.destination],
+                    "time": arrival.keyframe.time,
+                    "pinned": arrival.pinned,
+                    "residual_px": residual,
+                    "reason": arrival.reason,
+                }
+                for arrival, residual in zip(match.arrivals, residuals, strict=True)
+            ],
+            "residual_px": residuals,
+            "residual_max_px": max(residuals),
+            "tolerance_px": match.tolerance * side,
+            "status": match.status,
+            "iterations": match.iterations,
+            "evaluations": match.evaluations,
+            "history": [
+                {
+                    "stage": at.stage,
+                    "evaluations": at.evaluations,
+                    "objective": at.value,
+                    "worst_px": at.worst * side,
+                }
+                for at in match.history
+            ],
+            "search_seconds": match.seconds,
+        }
+
+    def _morph(self) -> dict[str, Any]:
+        """How well a morph's two pictures meet."""
+        morph = self.morph
+        if morph is None:
+            return {}
+        mean, most = morph.inconsistency_px()
+        residuals = [float(value) for value in morph.residuals_of_b()]
+        window, course = morph.pair.window, morph.course
+        return {
+            "morph": {
+                "to": list(morph.pair.size),
+                "window": [window.x, window.y, window.width, window.height],
+                "residual_px": {
+                    "first": [arrival.residual * self.side for arrival in self.match.arrivals],
+                    "second": residuals,
+                },
+                "residual_max_px": {
+                    "first": self.match.residual * self.side,
+                    "second": max(residuals),
+                },
+                "jacobian": {
+                    "first": [self.extremes["jacobian_min"], self.extremes["jacobian_max"]],
+                    "second": self.of_b,
+                },
+                "inconsistency_px": {"mean": mean, "max": most},
+                "blend": course.blend,
+                "notes": [*morph.pair.said, *morph.said],
+            }
+        }
+
+    def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
+        """The report; `seconds` adds the times that the animation does not know."""
+        animation, fluid = self.animation, self.animation.fluid
+        times = animation.seconds
+        return {
+            "picture": [animation.picture.width, animation.picture.height],
+            "grid": [animation.grid.nx, animation.grid.ny],
+            "frames": self.frames,
+            "fps": (self.morph.course if self.morph else animation).timeline.fps,
+            "steps": self._steps,
+            "settings": {
+                "viscosity": _described(fluid.viscosity),
+                "viscosity_moves": fluid.viscosity_moves,
+                "freeze": fluid.freeze.strength if fluid.freeze else None,
+                "walls": [fluid.walls.x.value, fluid.walls.y.value],
+                "scheme": fluid.scheme,
+                "solver": fluid.solver,
+                "substeps": animation.timeline.steps_per_frame,
+                "filter": animation.filter,
+                "edge": animation.edge,
+                "loop": animation.loop,
+                "forces": [_kind(force) for force in flat(animation.forces)],
+                "densities": list(fluid.density_names),
+                "layers": list(animation.layers),
+            },
+            "seconds": {
+                "compile": times.compile,
+                "simulate": times.simulate,
+                "lookup": times.lookup,
+                **seconds,
+            },
+            **self.extremes,
+            "area": _area(self.extremes),
+            **self._loop(),
+            **self._keyframes(),
+            **self._morph(),
+            "solves": self.solves,
+            "device": str(animation.solver.device.name),
+            "versions": versions(),
+        }
+
+
+def _area(extremes: Mapping[str, float]) -> str:
+    """Whether areas should be preserved: the range of det J says how well they are."""
+    if extremes["divergence_prescribed_max"] > 0:
+        return "not preserved: sources of divergence make places grow or shrink"
+    return "preserved, but for what det J shows"
+
+
+def _described(viscosity: Quantity) -> float | list[float] | str:
+    """A number; the least and the greatest of a painting; or what else it is."""
+    if isinstance(viscosity, Painted):
+        return [float(viscosity.values.min()), float(viscosity.values.max())]
+    return (
+        viscosity if isinstance(viscosity, float) else "keyed" if isinstance(viscosity, Keyed) else "of time"
+    )
+
+
+def _kind(force: Force) -> str:
+    return type(force).__name__ + (" under a mask" if force.weight is not None else "")
+
+
+def versions() -> dict[str, str]:
+    """Versions of wfluid and of the libraries that its results depend on."""
+    import numpy
+    import OpenImageIO
+    import warp
+
+    from wfluid import __version__
+
+    return {
+        "wfluid": __version__,
+        "warp": warp.__version__,
+        "OpenImageIO": OpenImageIO.__version__,
+        "numpy": numpy.__version__,
+    }
+
+
+def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
+    """Write a report as JSON, whole or not at all.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    path = Path(path)
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error

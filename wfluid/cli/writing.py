@@ -1,0 +1,122 @@
+"""Frames written in a second thread while the next are computed."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from wfluid.animation.animation import Animation
+from wfluid.animation.frame import Frame
+from wfluid.cli.progress import FrameProgress
+from wfluid.cli.report import Report
+from wfluid.files.output import open_output
+from wfluid.files.tracks import Tracks
+from wfluid.morphing.morph import Morph
+from wfluid.pictures.picture import Picture
+from wfluid.scene.scene import Output, Scene
+from wfluid.system.interrupt import HeldInterrupt
+from wfluid.view.densities import stretched
+
+QUEUED_FRAMES = 4
+"""Frames that may wait for the disk while the next ones are computed."""
+
+
+class _Writer(Protocol):
+    written: list[Path]
+
+    def close(self) -> None: ...
+    def abandon(self) -> None: ...
+
+
+def kept_frames(outputs: Sequence[Output]) -> int:
+    """How many outputs hold every frame until the last."""
+    return sum(output.file.suffix.lower() == ".gif" for output in outputs)
+
+
+def open_writers(scene: Scene, animation: Animation) -> list[tuple[_Writer, Callable[[Frame], None]]]:
+    """What writes each output, and how it takes a frame."""
+    found = []
+    width, height = scene.tables["picture"].get("size", (animation.picture.width, animation.picture.height))
+    for output in scene.outputs:
+        if output.of == "report":
+            continue
+        if output.of == "tracks":
+            tracks = Tracks(output.file, max(width, height))
+            found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
+            continue
+        writer = open_output(output.file, scene.timeline.fps, output.start, output.encoding)
+        found.append((writer, lambda frame, w=writer, of=output.of: w.write(_shown(frame, of))))
+    return found
+
+
+def _shown(frame: Frame, of: str) -> Picture:
+    """The picture of a frame that an output is of; a density is shown as its numbers."""
+    if of == "picture":
+        return frame.picture
+    if of in frame.layers:
+        return frame.layers[of]
+    width, height = frame.picture.width, frame.picture.height
+    values = stretched(np.maximum(frame.densities[of], 0.0), width, height, frame.map.walls.periodic)
+    return Picture(values[..., None], dtype="float", data=True)
+
+
+def write_frames(
+    animation: Animation | Morph,
+    writers: Sequence[tuple[_Writer, Callable[[Frame], None]]],
+    report: Report,
+    quiet: bool,
+) -> float:
+    """Compute frames and write them from a second thread; returns the seconds spent writing."""
+    writing = 0.0
+
+    def write(frame: Frame) -> None:
+        nonlocal writing
+        start = time.perf_counter()
+        for _, take in writers:
+            take(frame)
+        writing += time.perf_counter() - start
+
+    waiting: list[Future] = []
+    try:
+        with (
+            HeldInterrupt() as interrupt,
+            ThreadPoolExecutor(1) as pool,
+            FrameProgress(animation.frame_count, quiet) as advance,
+        ):
+            for frame in animation.frames():
+                interrupt.check()
+                report.add(frame)
+                if len(waiting) >= QUEUED_FRAMES:
+                    waiting.pop(0).result()
+                waiting.append(pool.submit(write, frame))
+                advance()
+            for future in waiting:
+                future.result()
+        start = time.perf_counter()
+        for writer, _ in writers:
+            writer.close()
+        return writing + time.perf_counter() - start
+    except KeyboardInterrupt:
+        for writer, _ in writers:
+            writer.close()  # what is there is whole: a movie ends at its last frame
+        print(f"interrupted; finished: {_finished(writers)}", file=sys.stderr)
+        raise
+    except BaseException:
+        for writer, _ in writers:
+            writer.abandon()
+        raise
+
+
+def _finished(writers: Sequence[tuple[_Writer, Callable[[Frame], None]]]) -> str:
+    """The files that are whole, of a sequence the first and the last."""
+    found = []
+    for writer, _ in writers:
+        ends = [str(path) for path in writer.written[:1] + writer.written[1:][-1:]]
+        found.append((" … " if len(writer.written) > 2 else ", ").join(ends))
+    return ", ".join(filter(None, found)) or "nothing"

@@ -1,0 +1,1 @@
+"""Space and time as descriptions: grid, walls, timeline, envelopes, paths. NumPy only."""

@@ -1,0 +1,1 @@
+"""Arrays on a device: fields, ghosts, state, captured graphs."""

@@ -1,0 +1,1 @@
+"""Animations, tracks and points as files."""

@@ -1,0 +1,102 @@
+"""Animated GIFs, with delays that keep the frame rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from wfluid.files import movie
+from wfluid.pictures.formats import PictureError
+from wfluid.pictures.picture import Picture, display_rgb
+from wfluid.system.atomic import whole_file
+
+LONGEST_DELAY = 65535
+"""Longest GIF delay that its two bytes hold [1/100 s]."""
+
+LEAST_DELAY = 2
+"""Shortest GIF delay that browsers obey [1/100 s]."""
+
+
+class Gif:
+    """An animated GIF that loops for ever: PyAV writes it where installed, else OpenImageIO.
+
+    GIF counts in hundredths of a second: the delays are spread so that their mean is 1 / fps.
+    """
+
+    def __init__(self, path: Path, fps: float):
+        if not 100 / LONGEST_DELAY <= fps <= 100 / LEAST_DELAY:
+            limits = f"{100 / LONGEST_DELAY:.2g} … {100 // LEAST_DELAY}"
+            raise PictureError(f"{path}: a GIF shows {limits} frames a second, not {fps:g}")
+        self.path, self.fps = path, fps
+        self.written: list[Path] = []
+        self._frames: list[np.ndarray] = []
+
+    def write(self, picture: Picture) -> None:
+        """Keep the frame: the format wants their number first."""
+        self._frames.append(display_rgb(picture))
+
+    def close(self) -> None:
+        """Write the file, if there are frames."""
+        if not self._frames:
+            return
+        with whole_file(self.path) as temporary:
+            if movie.available():
+                movie.write_gif(temporary, self._frames)
+            else:
+                _write_gif(temporary, self._frames)
+            data = bytearray(temporary.read_bytes())
+            set_delays(data, delays(len(self._frames), self.fps))
+            temporary.write_bytes(data)
+        self.written.append(self.path)
+
+    def abandon(self) -> None:
+        """Nothing is on the disk before `close`."""
+
+
+def _write_gif(path: Path, frames: list[np.ndarray]) -> None:
+    """Write 8-bit RGB frames as a GIF with OpenImageIO, a palette a frame."""
+    import OpenImageIO as oiio
+
+    height, width, channels = frames[0].shape
+    spec = oiio.ImageSpec(width, height, channels, "uint8")
+    out = oiio.ImageOutput.create(str(path))
+    done = out.open(str(path), (spec,) * len(frames))
+    for index, frame in enumerate(frames):
+        done = done and (index == 0 or out.open(str(path), spec, "AppendSubimage"))
+        done = done and out.write_image(frame)
+    message = out.geterror()
+    if not (out.close() and done):
+        raise PictureError(f"{path}: cannot be written ({message.strip() or 'no reason given'})")
+
+
+def delays(frames: int, fps: float) -> list[int]:
+    """Delay of each frame [1/100 s]: whole, never below 2, their sum the animation's length rounded."""
+    edges = np.floor(np.arange(frames + 1) * (100.0 / fps) + 0.5 + 1e-9).astype(int)
+    return [max(LEAST_DELAY, int(delay)) for delay in np.diff(edges)]
+
+
+def set_delays(gif: bytearray, hundredths: list[int]) -> None:
+    """Write each frame's delay into a GIF's graphic control extensions (GIF89a, section 23), in place."""
+    at = 13 + _table_size(gif[10])
+    frame = 0
+    while gif[at] != 0x3B:  # the trailer
+        if gif[at] == 0x21:
+            if gif[at + 1] == 0xF9:
+                gif[at + 4 : at + 6] = hundredths[frame].to_bytes(2, "little")
+                frame += 1
+            at = _after_blocks(gif, at + 2)
+        else:  # an image: descriptor, local palette, code size, data
+            at = _after_blocks(gif, at + 10 + _table_size(gif[at + 9]) + 1)
+    if frame != len(hundredths):
+        raise PictureError(f"the GIF has {frame} frames, expected {len(hundredths)}")
+
+
+def _table_size(flags: int) -> int:
+    return 3 << ((flags & 7) + 1) if flags & 0x80 else 0
+
+
+def _after_blocks(gif: bytearray, at: int) -> int:
+    while gif[at]:
+        at += gif[at] + 1
+    return at + 1

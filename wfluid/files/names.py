@@ -1,0 +1,50 @@
+"""Names of written files: frame numbers, folders."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from wfluid.pictures.formats import PictureError
+from wfluid.system.atomic import remove_leftovers
+
+FIRST_FRAME = 1001
+"""Number of the first frame of a sequence (the convention of film work)."""
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a file whose folder is not there or cannot be written; clear what killed runs left in it.
+
+    Raises:
+        PictureError: with the reason.
+    """
+    if not path.parent.is_dir():
+        raise PictureError(f"{path.parent}: no such folder; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise PictureError(f"{path.parent}: this folder cannot be written to")
+    if path.is_dir():
+        raise PictureError(f"{path}: a folder; name a file in it")
+    remove_leftovers(path.parent)
+
+
+def names(path: Path, start: int, frames: int) -> set[Path]:
+    """Every file that an animation of so many frames writes under a name, resolved."""
+    pattern = numbering(path)
+    if pattern is None:
+        return {path.resolve()}
+    return {numbered(path, pattern, n).resolve() for n in range(start, start + frames)}
+
+
+def numbered(path: Path, pattern: str, number: int) -> Path:
+    """The name of a frame: `pattern`, a run of # or %0Nd, replaced by its number."""
+    digits = len(pattern) if pattern[0] == "#" else int(pattern.strip("%d") or 0)
+    return path.with_name(path.name.replace(pattern, str(number).zfill(max(digits, 1))))
+
+
+def numbering(path: Path) -> str | None:
+    """The part of a name that stands for the frame's number: a run of #, or %0Nd."""
+    found = re.findall(r"#+|%0?\d*d", path.name)
+    if len(found) > 1:
+        raise PictureError(f"{path}: more than one frame number in the name")
+    return found[0] if found else None

@@ -1,0 +1,94 @@
+"""Animations as files: numbered pictures, GIF and movies. The name decides."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Protocol
+
+from wfluid.files import movie
+from wfluid.files.gif import Gif
+from wfluid.files.movie import MovieFile
+from wfluid.files.names import FIRST_FRAME, check_folder, numbering
+from wfluid.files.sequence import Sequence
+from wfluid.pictures.formats import Encoding, PictureError
+from wfluid.pictures.picture import Picture
+
+
+class Output(Protocol):
+    """Where frames go, in order; nothing is there under its final name before it is whole."""
+
+    written: list[Path]
+    """Files that are finished."""
+
+    def write(self, picture: Picture) -> None:
+        """Take the next frame."""
+        ...
+
+    def close(self) -> None:
+        """Finish what is written one file for all frames."""
+        ...
+
+    def abandon(self) -> None:
+        """Remove what is unfinished."""
+        ...
+
+
+def open_output(
+    path: str | os.PathLike, fps: float, start: int = FIRST_FRAME, encoding: Encoding | None = None
+) -> Output:
+    """The output for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
+
+    `start` is the number of a sequence's first frame, `encoding` how its stills are written.
+
+    Raises:
+        PictureError: a name that is none of these, a folder that does not exist or cannot be written, a
+            movie without the extra `video`, or an encoding that the format does not have.
+    """
+    path, encoding = Path(path), encoding or Encoding()
+    check_folder(path)
+    numbered = numbering(path)
+    if numbered is not None:
+        encoding.check(path)
+        if start < 0:
+            raise PictureError(f"first frame {start}: expected 0 or more")
+        return Sequence(path, numbered, start, encoding)
+    ending = path.suffix.lower()
+    if ending == ".gif":
+        return Gif(path, fps)
+    if ending in movie.CODECS:
+        if not movie.available():
+            raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
+        return MovieFile(path, fps)
+    kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
+    raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")
+
+
+class HasPicture(Protocol):
+    """Anything that shows a picture, such as a `Frame`."""
+
+    picture: Picture
+
+
+def write_animation(
+    path: str | os.PathLike,
+    frames: Iterable[HasPicture],
+    fps: float = 24.0,
+    start: int = FIRST_FRAME,
+    encoding: Encoding | None = None,
+) -> list[Path]:
+    """Write frames as they come; returns the files written.
+
+    Raises:
+        PictureError: see `open_output`; nothing unfinished is left behind.
+    """
+    output = open_output(path, fps, start, encoding)
+    try:
+        for frame in frames:
+            output.write(frame.picture)
+        output.close()
+    except BaseException:
+        output.abandon()
+        raise
+    return output.written

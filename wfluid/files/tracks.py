@@ -1,0 +1,42 @@
+"""Where followed points are, as a table of comma-separated values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from wfluid.pictures.formats import PictureError
+from wfluid.system.atomic import whole_file
+
+
+class Tracks:
+    """A CSV file with a row a frame and point: frame, time [s], point (from 0), x, y [px].
+
+    Pixels are those of a frame whose longer side is `side`.
+    """
+
+    def __init__(self, path: Path, side: float):
+        if path.suffix.lower() != ".csv":
+            raise PictureError(f"{path}: tracks are written as .csv")
+        self.path, self._side = path, side
+        self.written: list[Path] = []
+        self._rows: list[str] = []
+        self._frames = 0
+
+    def write(self, time: float, points: Sequence[tuple[float, float]] | np.ndarray) -> None:
+        """Take the next frame's points [longer side]."""
+        for n, (x, y) in enumerate(points):
+            self._rows.append(f"{self._frames},{time:.6g},{n},{x * self._side:.4f},{y * self._side:.4f}")
+        self._frames += 1
+
+    def close(self) -> None:
+        """Write the file, if there are frames."""
+        if self._rows:
+            with whole_file(self.path) as temporary:
+                temporary.write_text("\n".join(["frame,time,point,x,y", *self._rows]) + "\n")
+            self.written.append(self.path)
+
+    def abandon(self) -> None:
+        """Nothing is on the disk before `close`."""

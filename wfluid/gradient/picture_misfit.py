@@ -1,0 +1,146 @@
+"""How far the warped picture is from another: through the very look-up that renders frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from wfluid.fields.arrays import field, from_numpy
+from wfluid.fields.graph import exclusive
+from wfluid.fields.state import State
+from wfluid.gradient.state_objectives import StateObjective, Term
+from wfluid.kernels.adjoint import misfit
+from wfluid.kernels.cell.layout import HALO, Layout
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.view.lookup import Pixel
+from wfluid.model.painted import Painted
+from wfluid.pictures.picture import Picture
+from wfluid.pictures.sampling import check_look_up
+from wfluid.step.step import Stages
+from wfluid.view.lookup import QUAD, LookUp, quads_of
+from wfluid.view.lookup_adjoint import ADJOINTS, LookUpAdjoint
+
+
+@dataclass(frozen=True, eq=False)
+class PictureMisfit(StateObjective):
+    """How far the warped picture is from another, in linear light, alpha premultiplied:
+
+        1/2 integral over the picture of weight sum_channels (warped - target)^2    [longer side^2]
+
+    The integral is the mean over the pixels of the frame times the picture's area. The target's size is the
+    frame's; a picture that is larger is shrunk to it first, as frames of an animation are.
+
+    Raises:
+        ValueError: a filter without a gradient, an edge that does not exist, a target with other channels
+            than the warped picture, or a pixel that is not finite.
+    """
+
+    picture: Picture
+    """What is warped, stretched over the fluid."""
+    target: Picture
+    """What is wanted; with the transparent edge, which gives the picture an alpha, that as well."""
+    time: float
+    """When [s]."""
+    filter: str = "cubic"
+    """How the picture is read between pixels: "bilinear" or "cubic"."""
+    edge: str = "clamp"
+    """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
+    weight: Painted | None = None
+    """Where it counts: a factor painted over the picture."""
+
+    def __post_init__(self) -> None:
+        if self.filter not in ADJOINTS:
+            raise ValueError(
+                f"PictureMisfit: filter {self.filter!r} gives no gradient: expected one of "
+                f"{', '.join(ADJOINTS)}"
+            )
+        check_look_up(self.filter, self.edge)
+        for name in ("picture", "target"):
+            pixels = getattr(self, name).pixels
+            if pixels.ndim != 3 or not pixels.size:
+                raise ValueError(
+                    f"PictureMisfit.{name} of shape {pixels.shape}: expected (height, width, channels)"
+                )
+            if not np.all(np.isfinite(pixels)):
+                raise ValueError(f"PictureMisfit.{name}: a pixel is not finite")
+        gains = self.edge == "transparent" and self.picture.alpha is None
+        shown, wanted = self.picture.pixels.shape[2] + gains, self.target.pixels.shape[2]
+        if shown != wanted:
+            raise ValueError(
+                f"PictureMisfit.target has {wanted} channels: expected the {shown} of the warped picture"
+                + (", its alpha for the transparent edge included" if gains else "")
+            )
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device, for the grid and walls of `stages`."""
+        return _PictureTerm(self, stages, weight)
+
+
+class _PictureTerm(Term):
+    """Half the weighted squares of the pixels shown less those wanted."""
+
+    @exclusive
+    def __init__(self, misfit: PictureMisfit, stages: Stages, weight: float):
+        width, height, grid = misfit.target.width, misfit.target.height, stages.grid
+        self.device, self.layout = stages.device, Layout(width, height)
+        self._look_up = LookUp(
+            misfit.picture.shrunk(width, height),
+            grid,
+            stages.fluid.walls,
+            self.device,
+            width=width,
+            height=height,
+            filter=misfit.filter,
+            edge=misfit.edge,
+        )
+        self._adjoint = LookUpAdjoint(self._look_up)
+        self._targets = [self._on_frame(quad) for quad in quads_of(misfit.target.pixels)]
+        painted = (
+            np.ones((height, width)) if misfit.weight is None else misfit.weight.resampled(width, height)
+        )
+        self._weight = field(self.layout, self.device)
+        from_numpy(
+            painted * (weight * grid.width * grid.height / (width * height)), self._weight, self.layout
+        )
+        self._shown_bar = wp.zeros(self.layout.size, dtype=Pixel, device=self.device)
+        self._rows = wp.zeros(len(self._targets) * height, dtype=Real, device=self.device)
+
+    def _on_frame(self, quad: np.ndarray) -> wp.array:
+        """Pixels (height, width, 4) as the look-up lays them out."""
+        layout = self.layout
+        padded = np.zeros((layout.size, QUAD), dtype=quad.dtype)
+        grid = padded[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch, QUAD)
+        grid[HALO : HALO + layout.ny, HALO : HALO + layout.nx] = quad
+        return wp.array(padded, dtype=Pixel, device=self.device)
+
+    def _show(self, state: State) -> None:
+        """The warped picture."""
+        look_up = self._look_up
+        look_up.stretch(state.d_x, state.d_y)
+        look_up.place()
+        look_up.read()
+
+    def measure(self, state: State) -> None:
+        """Sums along rows."""
+        self._show(state)
+        layout = self.layout
+        for n, (shown, target) in enumerate(zip(self._look_up.shown, self._targets, strict=True)):
+            inputs = [shown, target, self._weight, layout.nx, layout.pitch, n * layout.ny]
+            misfit.row_misfits.launch(layout.ny, self.device, inputs, [self._rows])
+
+    def value(self) -> float:
+        """Half the sum over rows."""
+        return 0.5 * float(self._rows.numpy().sum(dtype=np.float64))
+
+    def adjoint(self, state: State, bar: State) -> None:
+        """The weighted misfit, back through the look-up."""
+        self._show(state)
+        self._adjoint.begin()
+        for n, (shown, target) in enumerate(zip(self._look_up.shown, self._targets, strict=True)):
+            inputs = [shown, target, self._weight]
+            misfit.weigh_misfit.launch(self.layout, self.device, inputs, [self._shown_bar])
+            self._adjoint.read(n, self._shown_bar)
+        self._adjoint.place()
+        self._adjoint.stretch(bar.d_x, bar.d_y)

@@ -1,0 +1,477 @@
+"""A run that can be gone back through.
+
+A step is recorded on a `wp.Tape` as one entry (`adjoint.StepAdjoint`) and captured in two graphs: a loop of
+steps forward, and a loop of the tape played back. Both find in device memory which step they are at
+(`kernels/adjoint/step_table.py`): the state it begins with, the numbers of what acts, where to leave what
+they find. So they are captured once, in the time of one step, for runs of any length and whatever their
+numbers. Only a solve that would go otherwise (more cycles for a stiffer fluid) has them captured anew.
+
+With a cap on memory, segments of the run take turns in the same tables (`schedule`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.arrays import from_numpy, to_numpy
+from wfluid.fields.device import load_kernels
+from wfluid.fields.graph import Replay, exclusive
+from wfluid.fields.state import State
+from wfluid.gradient.checkpoints import Advance, Restore, Reverse, Schedule, Store, even_segments, least_room
+from wfluid.gradient.state_objectives import Term
+from wfluid.gradient.step_tables import Counter, Table
+from wfluid.gradient.variables import Setup
+from wfluid.kernels.adjoint import misfit
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.cell.strips import STRIP, repeat_while
+from wfluid.step.adjoint import StepAdjoint
+from wfluid.step.forcing import Impulses
+from wfluid.step.step import Stages
+
+MEGABYTE = 2**20
+
+WORKING_STATES = 4
+"""Before and after a step, and the gradients with respect to both."""
+
+
+@dataclass(frozen=True)
+class Reversed:
+    """The gradients that going back through a run found."""
+
+    velocity: np.ndarray
+    """With respect to the velocity at the beginning, (2, ny, nx)."""
+    viscosity: np.ndarray
+    """With respect to the viscosity at centres, (ny, nx); 0 unless it was asked for."""
+    forces: Mapping[int, np.ndarray]
+    """With respect to what each force does in every step (`Impulses.gradients`)."""
+    sources: list[Mapping[int, np.ndarray]]
+    """The same for the sources of each density."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Steps of a timeline that are run."""
+
+    first: int
+    """The first of them."""
+    last: int
+    """The step before which they end."""
+    begun: State | None
+    """The fluid at the first; None at rest."""
+    points: np.ndarray
+    """Where particles begin [longer side], (n, 2)."""
+
+
+class Recording:
+    """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
+
+    It runs over a `Stretch` of the timeline. `terms` are objectives of the state after some steps. With
+    `effort` half the squares of what forces add count too. With `room` for more steps than it has it can be
+    `moved` to other stretches.
+
+    Raises:
+        ValueError: a memory cap too small, with the least that works.
+    """
+
+    @exclusive
+    def __init__(
+        self,
+        stages: Stages,
+        setup: Setup,
+        timeline: Timeline,
+        stretch: Stretch,
+        terms: Mapping[int, Sequence[Term]],
+        memory_mb: float | None = None,
+        of_viscosity: bool = False,
+        effort: bool = False,
+        room: int = 0,
+    ):
+        self.stages, self.timeline, self.device = stages, timeline, stages.device
+        self._stretch, self._terms = stretch, terms
+        self._term_replays: dict[Callable, Replay] = {}
+        grid, device = stages.grid, stages.device
+        self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
+        load_kernels(device)
+        self._adjoint = StepAdjoint(stages, timeline.dt, of_viscosity, self._effort)
+        self._before, self._after, self._bar, self._after_bar = (
+            State.at_rest(grid, device, len(stages.densities), len(stretch.points))
+            for _ in range(WORKING_STATES)
+        )
+        self._before.take_gradient(self._bar)
+        self._after.take_gradient(self._after_bar)
+        self._end = self._before.view()  # the same arrays for objectives, which add to what comes after
+        self._end.take_gradient(self._after_bar)
+        self.schedule = self._planned(memory_mb)
+        longest = max(end - start for start, end in self.schedule.segments)
+        rows = max(self.steps, room) if self.schedule.keeps_all else longest
+        stored = 0 if self.schedule.keeps_all else len(self.schedule.segments)
+        self.room = rows
+        self._states = [Table(a, rows + 1) for a in self._kept(self._before)]
+        self._stored = [Table(a, stored) for a in self._kept(self._before)]
+        self._impulses = Impulses(setup.forces, setup.fluid, grid, device, gradients=True)
+        self._numbers, self._boxes, self._bars = (
+            Table(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
+        )
+        self._pulls = [Table(p, rows + 1) for p in self._before.particles]
+        changes = stages.medium and stages.medium.changes
+        self._viscosities = Table(stages.medium.painted_mu, rows) if changes else None
+        self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
+        self._square_rows = Table(self._squares, rows)
+        self._counter, self._pool = Counter(device), stages.helpers(alone=True)
+        self._preparation: Replay | None = None
+        self._tapes: dict[int, wp.Tape] = {}
+        self._plan: tuple = ()
+        self.set(setup)
+
+    schedule: Schedule
+    """How its segments are kept and stored."""
+    room: int
+    """Steps that are kept at once."""
+
+    @property
+    def steps(self) -> int:
+        """How many steps it has."""
+        return self._stretch.last - self._stretch.first
+
+    def moved(self, setup: Setup, stretch: Stretch) -> None:
+        """Run over another stretch, for which there is room, with as many points, and with another setup.
+
+        Raises:
+            ValueError: as `set`.
+        """
+        self._stretch = stretch
+        self.schedule = self._planned(None)
+        self.set(setup)
+
+    def suits(self, setup: Setup, stretch: Stretch, effort: bool) -> bool:
+        """Whether it may be `moved` to a stretch and a setup of the same fluid."""
+        return (
+            self.schedule.keeps_all
+            and not self._terms
+            and effort == bool(self._effort)
+            and stretch.last - stretch.first <= self.room
+            and len(stretch.points) == len(self._stretch.points)
+            and setup.fluid is self.stages.fluid
+            and Impulses.key(setup.forces) == Impulses.key(self._setup.forces)
+        )
+
+    def _kept(self, state: State) -> list[wp.array]:
+        """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
+        pressure = [state.q] if self.stages.medium else []
+        return [state.u, state.v, state.d_x, state.d_y, *state.rho, *pressure, *state.particles]
+
+    def _planned(self, memory_mb: float | None) -> Schedule:
+        breaks = [step for step, terms in self._terms.items() if terms]
+        if memory_mb is None:
+            return even_segments(self.steps, breaks=breaks)
+        medium, row = self.stages.medium, sum(a.capacity for a in self._kept(self._before))
+        if medium and medium.changes:
+            row += self._before.u.capacity  # each step's own viscosity
+        each = row / MEGABYTE
+        try:
+            return even_segments(self.steps, int(memory_mb / each) - WORKING_STATES, breaks)
+        except ValueError:
+            least = math.ceil(100 * (least_room(self.steps, breaks) + WORKING_STATES) * each) / 100
+            raise ValueError(
+                f"memory_mb {memory_mb:g}: {self.steps} steps on {self.stages.grid.nx} x "
+                f"{self.stages.grid.ny} cells need at least {least:g}"
+            ) from None
+
+    @property
+    def memory(self) -> int:
+        """Bytes of all states and gradients."""
+        viscosities = [self._viscosities] if self._viscosities else []
+        tables = sum(table.array.capacity for table in (*self._states, *self._stored, *viscosities))
+        return tables + WORKING_STATES * sum(a.capacity for a in self._kept(self._before))
+
+    def time_of(self, step: int) -> float:
+        """When a step begins [s]."""
+        return self.timeline.time_of(self._stretch.first + step)
+
+    @exclusive
+    def set(self, setup: Setup) -> None:
+        """Take a setup whose fluid and forces differ from the first in numbers only.
+
+        Raises:
+            ValueError: a force beyond the limit.
+        """
+        self._setup, stages, dt = setup, self.stages, self.timeline.dt
+        rows, swelled = [], False
+        before = min(1, self._stretch.first)  # the step before decides what of its pressure is kept
+        for step in range(-before, self.steps):
+            kept = stages.kept(dt, dt if self._stretch.first + step else 0.0, swelled)
+            t, until = self.time_of(step), self.time_of(step + 1)
+            rows.append(self._impulses.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
+            swelled = self._impulses.prescribed > 0
+        columns = zip(*rows[before:], strict=True)
+        self._all_numbers, self._all_boxes = (np.stack(column) for column in columns)
+        stages.take_fluid(setup.fluid)
+        if self._viscosities:
+            plan = stages.expect([self.time_of(step + 1) for step in range(self.steps)], dt)
+        else:
+            plan = stages.plan(self.time_of(1), dt, self._prepare)
+        if plan != self._plan:
+            self._plan = ()  # should the captures be interrupted
+            forward = Replay(self.device, self._record, self._pool)
+            backward = Replay(self.device, self._play_back, self._pool)
+            self._forward, self._backward, self._plan = forward, backward, plan
+
+    def _prepare(self) -> None:
+        if self._preparation is None:
+            self._preparation = Replay(self.device, self.stages.follow_medium, self._pool)
+        self._preparation.launch()
+
+    def _record(self) -> None:
+        """Steps in a loop, and one of them on a tape; launches only."""
+        tape, counter, impulses = wp.Tape(), self._counter, self._impulses
+        before, after = self._before, self._after
+
+        def step() -> None:
+            self._numbers.take(counter, impulses.numbers)
+            self._boxes.take(counter, impulses.boxes)
+            self._take_viscosity()
+            self.stages.advance(before, after, impulses)
+            back = partial(self._adjoint.reverse, before, impulses, self._after_bar, self._bar)
+            record(tape, back, before, after)
+            if self._squares.size:
+                self._measure_effort()
+                self._square_rows.give(counter, self._squares)
+            for table, f, to in zip(self._states, self._kept(after), self._kept(before), strict=True):
+                table.give(counter, f, ahead=1)
+                table.copy(f, to)
+            counter.count(1)
+
+        repeat_while(counter.going, step)
+        self._tapes[_strip()] = tape
+
+    def _take_viscosity(self) -> None:
+        """Take the step's own viscosity, where it depends on the time; launches only."""
+        if not self._viscosities:
+            return
+        medium = self.stages.medium
+        self._viscosities.take(self._counter, medium.painted_mu)
+        medium.fill_painted()
+        if not self.stages.fluid.viscosity_moves:  # else it is taken along in the step
+            self.stages.follow_medium()
+
+    def _measure_effort(self) -> None:
+        """Squares of what forces add to the velocity, summed along rows; launches only."""
+        state, layout = self._before, self.stages.layout
+        pushed = self.stages.push(state, self._impulses)
+        for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
+            inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
+            misfit.row_squares.launch(layout.ny, self.device, inputs, [self._squares])
+
+    def _play_back(self) -> None:
+        """The tape in a loop; launches only."""
+        repeat_while(self._counter.going, self._step_back)
+
+    def _step_back(self) -> None:
+        counter, impulses, before = self._counter, self._impulses, self._before
+        counter.count(-1)
+        self._numbers.take(counter, impulses.numbers)
+        self._boxes.take(counter, impulses.boxes)
+        self._take_viscosity()
+        for table, f in zip(self._states, self._kept(before), strict=True):
+            table.take(counter, f)
+        for pulls, bar in zip(self._pulls, self._after_bar.particles, strict=True):
+            pulls.add_to(counter, bar, ahead=1)
+        self._tapes[_strip()].backward()
+        self._bars.give(counter, impulses.bars)
+        bars = zip(self._states, self._kept(self._bar), self._kept(self._after_bar), strict=True)
+        for table, f, to in bars:
+            table.copy(f, to)
+
+    def forward(self, looked_at: Sequence[int] = ()) -> dict[int, np.ndarray]:
+        """Run it; where the particles are [longer side], (n, 2), after each of the steps `looked_at`."""
+        self._begin()
+        places: dict[int, np.ndarray] = {}
+        self._value = 0.0
+        for action in self.schedule.forward():
+            self._do(action)
+            if not isinstance(action, Advance):
+                continue
+            base = self._base(action.start)
+            length = action.end - action.start
+            for step in looked_at:
+                if action.start < step <= action.end:
+                    places[step] = self._places_at(base + step - action.start)
+            for squares in self._square_rows.rows(base, base + length):  # in an order that no cap changes
+                self._value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
+            for term in self._terms.get(action.end, ()):
+                self._replay(term, term.measure).launch()
+                self._value += term.value()
+        return places
+
+    @property
+    def value(self) -> float:
+        """What the last `forward` found of effort and of the terms."""
+        return self._value
+
+    @exclusive
+    def end(self) -> State:
+        """A copy of the state at the end of the last `forward`."""
+        return self._before.copy()
+
+    @property
+    def finite(self) -> bool:
+        """Whether the fluid was at the end of the last `forward`; what is not finite spreads, and stays."""
+        return all(np.all(np.isfinite(a.numpy())) for a in self._kept(self._before))
+
+    def _places_at(self, row: int) -> np.ndarray:
+        columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
+        return np.stack(columns, axis=1) * (self.stages.grid.hx, self.stages.grid.hy)
+
+    def first_step_not_finite(self) -> int | None:
+        """The first step after which the fluid is not finite, run again; None where it stays so."""
+        self._begin()
+        for action in self.schedule.forward():
+            self._do(action)
+            if isinstance(action, Advance):
+                base = self._base(action.start)
+                for n in range(action.end - action.start):
+                    ends = [table.rows(base + n + 1, base + n + 2) for table in self._states]
+                    if not all(np.all(np.isfinite(end)) for end in ends):
+                        return action.start + n
+        return None
+
+    def backward(
+        self, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None = None
+    ) -> Reversed:
+        """Go back through the last `forward`.
+
+        `pulls` are gradients (n, 2) with respect to the particles' places [longer side] after some steps.
+        With `watch`, which is told each step and the gradient before it, all is done singly, not replayed.
+        """
+        self._clear()
+        bars = np.zeros((self.steps, self._bars.size))
+        for action in self.schedule.backward():
+            if isinstance(action, Reverse):
+                self._reverse(action, pulls, watch)
+                base, length = self._base(action.start), action.end - action.start
+                bars[action.start : action.end] = self._bars.rows(base, base + length)
+            else:
+                self._do(action)
+        layout, numbers = self.stages.layout, self._all_numbers
+        velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
+        self._adjoint.fold_viscosity()
+        return Reversed(
+            np.stack(velocity),
+            to_numpy(self._adjoint.mu_bar, layout).astype(np.float64),
+            self._impulses.gradients(numbers, bars),
+            self._impulses.source_gradients(numbers, bars),
+        )
+
+    @exclusive
+    def _clear(self) -> None:
+        """Begin with no gradients."""
+        self._adjoint.mu_bar.zero_()
+        for a in self._after_bar.arrays:
+            a.zero_()
+
+    def _reverse(
+        self, action: Reverse, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None
+    ) -> None:
+        """Go back through one segment."""
+        start, length, base = action.start, action.end - action.start, self._base(action.start)
+        terms = self._terms.get(action.end, ())
+        if terms:
+            self._copy([table.row(base + length) for table in self._states], self._kept(self._before))
+        for term in terms:
+            self._replay(term, term.adjoint).launch()
+        scales = (self.stages.grid.hx, self.stages.grid.hy)
+        for axis, (table, h) in enumerate(zip(self._pulls, scales, strict=True)):
+            rows = np.zeros((length, table.size))
+            for n in range(length):
+                if start + n + 1 in pulls:
+                    rows[n] = pulls[start + n + 1][:, axis] * h
+            table.put(base + 1, rows)
+        if watch is None:
+            self._counter.set(base + length, base)
+            self._backward.launch()
+            return
+        for n in reversed(range(length)):
+            self._counter.set(base + n + 1, base + n)
+            self._step_back()
+            watch(start + n, self._bar)
+
+    def _replay(self, term: Term, work: Callable) -> Replay:
+        """Launches of a term, captured when first used."""
+        if work not in self._term_replays:
+            arguments = [self._end, self._after_bar] if work == term.adjoint else [self._end]
+            self._term_replays[work] = Replay(self.device, partial(work, *arguments), None)
+        return self._term_replays[work]
+
+    def _base(self, start: int) -> int:
+        """The row of a segment's first state."""
+        return start if self.schedule.keeps_all else 0
+
+    @exclusive
+    def _begin(self) -> None:
+        """The state at the beginning: what was given, or at rest but for the velocity."""
+        state, stages, grid = self._before, self.stages, self.stages.grid
+        for p, column, h in zip(state.particles, self._stretch.points.T, (grid.hx, grid.hy), strict=True):
+            p.assign(column / h)
+        if self._stretch.begun:
+            for a, b in zip(self._stretch.begun.fields, state.fields, strict=True):
+                wp.copy(b, a)
+            return
+        for a in state.fields:
+            a.zero_()
+        for density, rho in zip(stages.densities, state.rho, strict=True):
+            density.begin(rho)
+        pairs = zip(self._setup.velocity, (state.u, state.v), stages.velocity_ghosts, strict=True)
+        for values, f, ghosts in pairs:
+            from_numpy(values, f, stages.layout)
+            ghosts.fill(f)
+
+    def _do(self, action: Advance | Store | Restore) -> None:
+        if isinstance(action, Advance):
+            start, end, base = action.start, action.end, self._base(action.start)
+            self._put(start, end)
+            self._counter.set(base, base + end - start)
+            self._forward.launch()
+            return
+        number = [start for start, _ in self.schedule.segments].index(action.step)
+        stored = [table.row(number) for table in self._stored]
+        now = self._kept(self._before)
+        self._copy(*((now, stored) if isinstance(action, Store) else (stored, now)))
+
+    @exclusive
+    def _put(self, start: int, end: int) -> None:
+        """Put the numbers of some steps, and the state they begin with, on the device."""
+        base = self._base(start)
+        self._numbers.put(base, self._all_numbers[start:end])
+        self._boxes.put(base, self._all_boxes[start:end])
+        for step in range(start, end) if self._viscosities else ():
+            row = self._viscosities.row(base + step - start)
+            from_numpy(self.stages.medium.at(self.time_of(step + 1)), row, self.stages.layout)
+        self._copy(self._kept(self._before), [table.row(base) for table in self._states])
+
+    @exclusive
+    def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:
+        for a, b in zip(source, to, strict=True):
+            if a.size:
+                wp.copy(b, a)
+
+
+def record(tape: wp.Tape, back: Callable[[], None], read: State, written: State) -> None:
+    """Put a step on a tape; Warp learns what it read and wrote (`wp.config.verify_autograd_array_access`)."""
+    for a in written.arrays:
+        a.mark_write(operation="a step", filename=__file__, lineno=0)
+    for a in read.arrays:
+        a.mark_read()
+    tape.record_func(back, read.arrays + written.arrays)
+
+
+def _strip() -> int:
+    """The strip whose launches are being captured."""
+    strip = STRIP.get()
+    return strip.index if strip else 0

@@ -1,0 +1,230 @@
+"""Objectives of the state on the device: misfits of maps and densities, and Warp programs."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from wfluid.fields.arrays import from_numpy, vector
+from wfluid.fields.state import State
+from wfluid.gradient.objectives import Objective, finite_array, places_of
+from wfluid.kernels.adjoint import misfit
+from wfluid.kernels.adjoint import transport as transport_adjoint
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.solve import sums
+from wfluid.model.painted import Painted
+from wfluid.step.step import Stages
+
+
+class StateObjective(Objective):
+    """An objective of the fluid at one time."""
+
+    time: float
+    """When [s]."""
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Its one time."""
+        return (self.time,)
+
+    @abstractmethod
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """It on the device, for the grid and fluid of `stages`; `particles` are its own of the state's."""
+
+
+class Term(ABC):
+    """An objective of the fluid at one time, on the device, times its weight."""
+
+    @abstractmethod
+    def measure(self, state: State) -> None:
+        """Find its value at a state: launches only."""
+
+    @abstractmethod
+    def value(self) -> float:
+        """What the last `measure` found."""
+
+    @abstractmethod
+    def adjoint(self, state: State, bar: State) -> None:
+        """Add its gradient with respect to a state to `bar`: launches only."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapMisfit(StateObjective):
+    """How far the map is from another: 1/2 the integral over the picture of weight |d - target|^2.
+
+    d is the displacement source - x, as `State.displacement` has it [longer side].
+
+    Raises:
+        ValueError: a target that is not finite or not (2, ny, nx) of the grid.
+    """
+
+    target: np.ndarray
+    """Displacement that is wanted [longer side], (2, ny, nx)."""
+    time: float
+    """When [s]."""
+    weight: Painted | None = None
+    """Where it counts: a factor painted over the picture."""
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device, where displacements are in cells."""
+        grid = stages.grid
+        scales = (grid.hx, grid.hy)
+        target = finite_array("MapMisfit.target", self.target, (2, grid.ny, grid.nx))
+        targets = [component / h for component, h in zip(target, scales, strict=True)]
+        squares = [weight * h**2 * grid.hx * grid.hy for h in scales]
+        return _FieldMisfit(stages, ("d_x", "d_y"), targets, squares, self.weight)
+
+
+@dataclass(frozen=True, eq=False)
+class DensityMisfit(StateObjective):
+    """How far a density is from another: 1/2 the integral over the picture of weight (rho - target)^2.
+
+    Raises:
+        ValueError: a density that does not exist; a target that is not finite or not (ny, nx) of the grid.
+    """
+
+    density: str
+    """Name of the `Density`."""
+    target: np.ndarray
+    """What is wanted, (ny, nx)."""
+    time: float
+    """When [s]."""
+    weight: Painted | None = None
+    """Where it counts: a factor painted over the picture."""
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device."""
+        grid, names = stages.grid, stages.fluid.density_names
+        if self.density not in names:
+            there = ", ".join(names) or "none"
+            raise ValueError(f"DensityMisfit of {self.density!r}: expected one of the fluid's ({there})")
+        target = finite_array("DensityMisfit.target", self.target, (grid.ny, grid.nx))
+        squares = [weight * grid.hx * grid.hy]
+        return _FieldMisfit(stages, (names.index(self.density),), [target], squares, self.weight)
+
+
+class _FieldMisfit(Term):
+    """Half the weighted squares of fields at centres less what they should be."""
+
+    def __init__(
+        self,
+        stages: Stages,
+        names: Sequence[str | int],
+        targets: Sequence[np.ndarray],
+        squares: Sequence[float],
+        paint: Painted | None,
+    ):
+        self._names, self.layout, self.device, grid = names, stages.layout, stages.device, stages.grid
+        fields = len(names)
+        self._targets, self._weights, self._left, self._weighted = (
+            vector(self.layout, self.device, fields) for _ in range(4)
+        )
+        painted = np.ones((grid.ny, grid.nx)) if paint is None else paint.on(grid)
+        for n, (target, square) in enumerate(zip(targets, squares, strict=True)):
+            from_numpy(target, self._targets[n], self.layout)
+            from_numpy(square * painted, self._weights[n], self.layout)
+        self._rows = wp.zeros(fields * grid.ny, dtype=Real, device=self.device)
+
+    def _fields(self, state: State) -> list[wp.array]:
+        return [state.rho[name] if isinstance(name, int) else getattr(state, name) for name in self._names]
+
+    def measure(self, state: State) -> None:
+        """Sums along rows."""
+        layout = self.layout
+        for n, f in enumerate(self._fields(state)):
+            out = [self._left[n], self._weighted[n]]
+            inputs = [f, self._targets[n], self._weights[n]]
+            misfit.misfit.launch(layout, self.device, inputs, out)
+            inputs = [*out, layout.nx, layout.pitch, n * layout.ny]
+            sums.row_products.launch(layout.ny, self.device, inputs, [self._rows])
+
+    def value(self) -> float:
+        """Half the sum over rows."""
+        return 0.5 * float(self._rows.numpy().sum(dtype=np.float64))
+
+    def adjoint(self, state: State, bar: State) -> None:
+        """The weighted misfit."""
+        for n, (f, to) in enumerate(zip(self._fields(state), self._fields(bar), strict=True)):
+            out = [self._left[n], self._weighted[n]]
+            inputs = [f, self._targets[n], self._weights[n]]
+            misfit.misfit.launch(self.layout, self.device, inputs, out)
+            transport_adjoint.add.launch(self.layout, self.device, [self._weighted[n]], [to])
+
+
+@dataclass(frozen=True, eq=False)
+class WarpObjective(StateObjective):
+    """An objective in Warp: kernels of one's own, which Warp differentiates.
+
+    @wp.kernel
+    def spread(x: wp.array[float], y: wp.array[float], value: wp.array[float]):
+        n = wp.tid()
+        wp.atomic_add(value, 0, x[n] * x[n] + y[n] * y[n])
+
+    def launch(state, value):
+            wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
+
+        WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
+
+    The program is called once, and what it launches captured and repeated: it must do nothing but launch.
+    Fields have ghosts, and rows padded to whole spans: the cell in column i of row j is entry
+    `first + j * pitch + i` of `state.layout`; what is read elsewhere has no gradient.
+
+    Raises:
+        ValueError: a program that launches nothing, when the objective is first asked for.
+    """
+
+    program: Callable[[State, wp.array], Any]
+    """Launches kernels that read the state's arrays (units as `State` says) and add to `value[0]`."""
+    time: float
+    """When [s]."""
+    points: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    """Where particles begin [longer side], (n, 2), whose places are the state's p_x and p_y."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", places_of("points", self.points))
+
+    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+        """On the device."""
+        return _Program(self.program, weight, particles, stages.device)
+
+
+class _Program(Term):
+    """A user's launches, on a tape of their own."""
+
+    def __init__(
+        self, program: Callable[[State, wp.array], Any], weight: float, particles: slice, device: wp.Device
+    ):
+        self._program, self._weight, self._particles = program, weight, particles
+        self._value = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
+        self._nothing = wp.zeros(0, dtype=Real, device=device)
+
+    def measure(self, state: State) -> None:
+        """Run the program on a tape of its own."""
+        self._value.zero_()
+        own = self._particles
+        p_x, p_y = (p[own] if own.stop > own.start else self._nothing for p in state.particles)
+        self._tape = wp.Tape()
+        own_state = replace(state, p_x=p_x, p_y=p_y)
+        with self._tape:
+            self._program(own_state, self._value)
+        if not self._tape.launches:
+            raise ValueError("WarpObjective: the program launched no kernel that Warp can differentiate")
+        arrays = [a for n in self._tape.launches if not callable(n) for a in (*n[3], *n[4])]
+        kept = {a.ptr for a in (*own_state.arrays, self._value)}
+        self._between = [a for a in arrays if isinstance(a, wp.array) and a.grad and a.ptr not in kept]
+
+    def value(self) -> float:
+        """Times the weight."""
+        return self._weight * float(self._value.numpy()[0])
+
+    def adjoint(self, state: State, bar: State) -> None:
+        """Play the tape back: the state's arrays know their gradients."""
+        self._value.grad.fill_(self._weight)
+        for a in self._between:
+            a.grad.zero_()
+        self._tape.backward()

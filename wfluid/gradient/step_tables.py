@@ -1,0 +1,75 @@
+"""Tables on the device with a row a step, and the counter that says which row a loop is at."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from wfluid.fields.graph import exclusive
+from wfluid.kernels.adjoint import step_table
+
+CHUNK = 1024
+"""Entries that a line copies on a CPU; on CUDA one."""
+
+
+class Counter:
+    """The row that a captured loop is at, and where it ends."""
+
+    def __init__(self, device: wp.Device):
+        self.device = device
+        self.step, self.going = (wp.zeros(n, dtype=wp.int32, device=device) for n in (2, 1))
+
+    @exclusive
+    def set(self, row: int, end: int) -> None:
+        """Begin at a row; the loop ends when it is at `end`."""
+        self.step.assign(np.array([row, end], dtype=np.int32))
+        self.going.fill_(int(row != end))
+
+    def count(self, by: int) -> None:
+        """Go on by so many rows: launches only."""
+        step_table.count.launch(1, self.device, [by], [self.step, self.going])
+
+
+class Table:
+    """So many rows like an array."""
+
+    def __init__(self, like: wp.array, count: int):
+        self.size, self.device = like.size, like.device
+        self.array = wp.zeros(self.size * count, dtype=like.dtype, device=like.device)
+        self._chunk = 1 if self.device.is_cuda else CHUNK
+        self._lines = -(-self.size // self._chunk)
+        self._take = step_table.take_indices if like.dtype is wp.int32 else step_table.take
+
+    def take(self, counter: Counter, out: wp.array, ahead: int = 0) -> None:
+        """Out = the row that is `ahead` of the counter's: launches only."""
+        inputs = [self.array, counter.step, ahead, self.size, self._chunk]
+        self._take.launch(self._lines, self.device, inputs, [out])
+
+    def give(self, counter: Counter, f: wp.array, ahead: int = 0) -> None:
+        """The row that is `ahead` of the counter's = f: launches only."""
+        inputs = [f, counter.step, ahead, self.size, self._chunk]
+        step_table.give.launch(self._lines, self.device, inputs, [self.array])
+
+    def copy(self, f: wp.array, out: wp.array) -> None:
+        """Out = f, both as long as a row: launches only."""
+        step_table.copied.launch(self._lines, self.device, [f, self.size, self._chunk], [out])
+
+    def add_to(self, counter: Counter, out: wp.array, ahead: int = 0) -> None:
+        """Add the row that is `ahead` of the counter's to `out`: launches only."""
+        step_table.add_row.launch(self.size, self.device, [self.array, counter.step, ahead, self.size], [out])
+
+    def row(self, n: int) -> wp.array:
+        """Row n itself."""
+        return self.array if not self.size else self.array[n * self.size : (n + 1) * self.size]
+
+    @exclusive
+    def put(self, first: int, values: np.ndarray) -> None:
+        """Write rows (count, size), from `first` on."""
+        if values.size:
+            self.array[first * self.size : (first + len(values)) * self.size].assign(values.ravel())
+
+    def rows(self, first: int, end: int) -> np.ndarray:
+        """Rows `first` … `end` - 1 as (end - first, size)."""
+        if not self.size or first == end:
+            return np.zeros((end - first, self.size))
+        return self.array[first * self.size : end * self.size].numpy().reshape(-1, self.size)

@@ -1,0 +1,1 @@
+"""Forces that take points to their targets."""

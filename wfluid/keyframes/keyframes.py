@@ -1,0 +1,155 @@
+"""Particle keyframes: where points of the picture should be, and when (Bonilla & Velho, section III)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from wfluid.domain.paths import Place
+
+TOLERANCE = 0.25 / 512
+"""Residual that is good enough [longer side]: a quarter of a pixel of a picture of 512."""
+
+COINCIDENT = 1e-6
+"""Places nearer than this are one [longer side]."""
+
+
+@dataclass(frozen=True)
+class ParticleKeyframe:
+    """A point of the picture should be somewhere at a time; several of one point make a path.
+
+    Raises:
+        ValueError: numbers that are not finite, a time that is not positive, a weight that is not positive.
+    """
+
+    point: Place
+    """Place of the point in the untouched picture [longer side]."""
+    destination: Place
+    """Where it should be [longer side]."""
+    time: float
+    """When [s], after 0."""
+    weight: float = 1.0
+    """How much its misfit counts beside others."""
+
+    def __post_init__(self) -> None:
+        for name in ("point", "destination"):
+            place = tuple(float(value) for value in getattr(self, name))
+            if len(place) != 2 or not all(map(math.isfinite, place)):
+                raise ValueError(f"ParticleKeyframe.{name} {place}: expected two finite numbers")
+            object.__setattr__(self, name, place)
+        for name in ("time", "weight"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"ParticleKeyframe.{name} {value}: expected a positive number")
+
+
+@dataclass(frozen=True, eq=False)
+class Particle:
+    """A point with its keyframes in their order."""
+
+    point: Place
+    """Place in the untouched picture [longer side]."""
+    times: tuple[float, ...]
+    """When [s]."""
+    destinations: np.ndarray
+    """Where [longer side], (keyframes, 2)."""
+    weights: tuple[float, ...]
+    """How much each counts."""
+    pinned: bool = False
+    """Whether it should stay in its place all the time."""
+
+
+def particles_of(
+    keyframes: Sequence[ParticleKeyframe],
+    pins: Sequence[Place],
+    extent: tuple[float, float],
+    end: float,
+    side: float = 1.0,
+) -> list[Particle]:
+    """The points of keyframes, and pins, which stay until the last keyframe.
+
+    `side` is the longer side in the unit that refusals should speak of.
+
+    Raises:
+        ValueError: no keyframes; a place outside the picture; a time after the end; one point sent to two
+            places at once, two points to one place at once, or to where a pin is; a point that is pinned
+            and moved.
+    """
+    if not keyframes:
+        raise ValueError("no keyframes: say where at least one point should be")
+    pins = [tuple(float(value) for value in pin) for pin in pins]
+    moved: dict[Place, list[ParticleKeyframe]] = {}
+    for keyframe in keyframes:
+        for what, place in (("point", keyframe.point), ("destination", keyframe.destination)):
+            _check_inside(f"the {what}", place, extent, side)
+        if keyframe.time > end * (1 + 1e-9):
+            raise ValueError(f"a keyframe at {keyframe.time:g} s: expected at most the duration, {end:g} s")
+        moved.setdefault(_known(keyframe.point, moved), []).append(keyframe)
+    for pin in pins:
+        _check_inside("the pin", pin, extent, side)
+        if _known(pin, moved) in moved:
+            raise ValueError(f"the point {_shown(pin, side)} is pinned and moved")
+    pins = [pin for n, pin in enumerate(pins) if all(math.dist(pin, one) >= COINCIDENT for one in pins[:n])]
+    found = [_particle(point, own, side) for point, own in moved.items()]
+    _refuse_meetings(found, pins, side)
+    times = tuple(sorted({keyframe.time for keyframe in keyframes}))
+    weights = (1.0,) * len(times)
+    found += [Particle(pin, times, np.tile(pin, (len(times), 1)), weights, True) for pin in pins]
+    return found
+
+
+def _check_inside(what: str, place: Place, extent: tuple[float, float], side: float) -> None:
+    if not all(0 <= value <= size for value, size in zip(place, extent, strict=True)):
+        shown = f"{extent[0] * side:g} x {extent[1] * side:g}"
+        raise ValueError(f"{what} {_shown(place, side)} lies outside the picture, {shown}")
+
+
+def _known(place: Place, moved: dict[Place, list[ParticleKeyframe]]) -> Place:
+    """The point that this is."""
+    return next((other for other in moved if math.dist(place, other) < COINCIDENT), place)
+
+
+def _particle(point: Place, own: Sequence[ParticleKeyframe], side: float) -> Particle:
+    own = sorted(own, key=lambda keyframe: keyframe.time)
+    for one, other in pairwise(own):
+        if one.time == other.time:
+            same = math.dist(one.destination, other.destination) < COINCIDENT
+            raise ValueError(
+                f"the point {_shown(point, side)} has "
+                + ("the same keyframe twice" if same else "two destinations")
+                + f" at {one.time:g} s"
+            )
+    return Particle(
+        point,
+        tuple(keyframe.time for keyframe in own),
+        np.array([keyframe.destination for keyframe in own]),
+        tuple(keyframe.weight for keyframe in own),
+    )
+
+
+def _refuse_meetings(found: Sequence[Particle], pins: Sequence[Place], side: float) -> None:
+    """No flow brings two points to one place."""
+    for one, other in combinations(found, 2):
+        for n, time in enumerate(one.times):
+            if time not in other.times:
+                continue
+            place = one.destinations[n]
+            if math.dist(place, other.destinations[other.times.index(time)]) < COINCIDENT:
+                both = f"{_shown(one.point, side)} and {_shown(other.point, side)}"
+                raise ValueError(
+                    f"the points {both} have one destination, {_shown(place, side)}, at {time:g} s"
+                )
+    for one in found:
+        for place in one.destinations:
+            if any(math.dist(place, pin) < COINCIDENT for pin in pins):
+                raise ValueError(
+                    f"the point {_shown(one.point, side)} is sent to {_shown(place, side)}, which is pinned"
+                )
+
+
+def _shown(place: Sequence[float], side: float) -> str:
+    return f"{place[0] * side:.6g},{place[1] * side:.6g}"

@@ -1,0 +1,351 @@
+"""The search for the forces that take particles to their keyframes.
+
+Minimised is phi (`journey`) + weight (effort + smoothness). Effort is half the integral of |f|^2 over that
+of a typical force; smoothness is half the squares of the changes, from a force to the next of its point, of
+strength and place in units of what moves a point by a radius. What that weighs keeps points a little from
+their keyframes; multipliers take them there, and where these are too slow the weight is lowered.
+
+On a coarse grid first. Window by window, each with a look at the next, forces are found that keep the points
+on their ways: a march can follow where one search over the whole time would have to aim through a flow that
+it does not know yet. Then all windows together, bound to the keyframes alone. Last on the grid asked for,
+where a few evaluations are enough. Longer scenes are cut at keyframes into spans; each begins with the fluid
+that the one before has left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.state import State
+from wfluid.gradient.functional import Functional, Seconds
+from wfluid.gradient.objectives import Effort
+from wfluid.gradient.variables import Free
+from wfluid.keyframes.way_misfit import NOTHING, Journey
+from wfluid.keyframes.ways import Way
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import Force
+from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.optimize.lbfgs import Settings, minimise
+from wfluid.optimize.lbfgs import State as Iterate
+
+MARCH, COARSE, FINE = "march", "coarse", "fine"
+"""Stages of a search."""
+
+MARCH_WEIGHT, WEIGHT = 1e-3, 1e-4
+"""Weight of effort and smoothness: in the march, and then to begin with."""
+
+LOWER, LEAST_WEIGHT = 0.1, 1e-8
+"""The factor that lowers it, and where that ends."""
+
+EVALUATIONS = {MARCH: 25, COARSE: 30, FINE: 15}
+"""Most evaluations of a minimisation; a march has one a window."""
+
+CHANGE = {MARCH: 1e-2, COARSE: 1e-3, FINE: 1e-3}
+"""Relative decrease at which it ends."""
+
+ROUNDS = {COARSE: 12, FINE: 8}
+"""Most minimisations of a stage."""
+
+NEAR = {COARSE: 0.5, FINE: 0.4}
+"""Parts of the tolerance: misfits of keyframes at which a stage ends; a march is led by more than these."""
+
+NEAR_ENOUGH = 0.5
+"""Part of the tolerance: misfit at which the weight needs no lowering."""
+
+NOISE = 1e-6
+"""Relative, of values computed in single precision."""
+
+MEMORY = 20
+"""Pairs that the optimiser keeps: little beside a run, and many of the few directions there are."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a search is."""
+
+    stage: str
+    """"march", "coarse" or "fine"."""
+    iteration: int
+    """Iterations so far, of all stages."""
+    evaluations: int
+    """Runs with their gradients so far."""
+    value: float
+    """What this stage minimises: phi, and what effort and smoothness weigh."""
+    worst: float
+    """The longest misfit of a keyframe in this stage's time [longer side]."""
+
+
+class Stopped(Exception):
+    """The search was told to stop; its best so far is in it."""
+
+
+@dataclass
+class Log:
+    """What a search has done."""
+
+    heed: Callable[[Progress], object] = lambda progress: None
+    """Told of every iteration; what it returns, if true, stops the search."""
+    history: list[Progress] = field(default_factory=list)
+    """Every iteration."""
+    evaluations: int = 0
+    """Runs with their gradients."""
+    seconds: Seconds = field(default_factory=Seconds)
+    """Where their time went."""
+
+
+@dataclass(frozen=True, eq=False)
+class Span:
+    """A stretch of time between keyframes, with forces of its own."""
+
+    ways: Sequence[Way]
+    """Of all points."""
+    edges: Sequence[int]
+    """Steps at which its windows begin and end."""
+    forces: Sequence[GaussianForce]
+    """The forces to begin with, point by point, in the order of their windows."""
+    windows: Sequence[int]
+    """The window of each; -1 for one that a march leaves alone."""
+    owners: Sequence[int]
+    """The point of each."""
+    guided: Sequence[bool]
+    """Which points are led along their ways."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What moves beside the forces that are sought."""
+
+    fluid: Fluid
+    """What the picture is made of."""
+    given: Sequence[Force]
+    """Forces that are the user's."""
+    free: Sequence[Free]
+    """What of the user's forces may vary."""
+    timeline: Timeline
+    """Its steps."""
+    device: str | None
+    """Where it is computed."""
+    captured: dict[Grid, Functional]
+    """The last functional on each grid: the next one takes over its graphs, if it can."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A grid, and the fluid on it at the beginning of a span."""
+
+    grid: Grid
+    """The grid."""
+    begin: tuple[float, State] | None
+    """When the span begins, and with what; None at rest."""
+    points: np.ndarray
+    """Where the points are then [longer side], (n, 2)."""
+
+
+class Search:
+    """Finds the forces of one span.
+
+    It holds the best forces so far in `given` and `forces`, whatever ends it.
+    """
+
+    def __init__(self, scene: Scene, span: Span, tolerance: float, log: Log):
+        self._scene, self._span, self._tolerance, self._log = scene, span, tolerance, log
+        self.given, self.forces = tuple(scene.given), tuple(span.forces)
+        self._time_of = scene.timeline.time_of
+        self._unit = float(np.mean([force.radius for force in span.forces])) if span.forces else 0.05
+        self._scales = [self._scale(force) for force in span.forces]
+        typical = [
+            0.5 * scale**2 * math.pi * force.radius**2 * (force.envelope.end - force.envelope.start)
+            for scale, force in zip(self._scales, span.forces, strict=True)
+        ]
+        self._typical_effort = float(np.mean(typical)) if typical else 1.0
+        self._weight = WEIGHT
+        self._lures: dict[float, np.ndarray] = {}
+
+    given: tuple[Force, ...]
+    """The user's forces."""
+    forces: tuple[GaussianForce, ...]
+    """The forces sought."""
+
+    @staticmethod
+    def _scale(force: GaussianForce) -> float:
+        """The strength that moves a point by a radius within two windows; pressure takes half of it."""
+        window = force.envelope.end - force.envelope.start
+        return 2 * force.radius / window**2
+
+    def march(self, level: Level) -> None:
+        """Find forces that keep the points on their ways, window by window."""
+        edges, windows = self._span.edges, self._span.windows
+        for first in range(len(edges) - 1):
+            last = min(first + 2, len(edges) - 1)
+            near = [n for n, window in enumerate(windows) if first <= window < last]
+            if not near:
+                return
+            free = [Free(self._name(n, "vector"), self._scales[n]) for n in near]
+            self._minimise(MARCH, level, (edges[first], edges[last]), free)
+            if first + 2 < len(edges):
+                level = self.after(level, edges[first + 1])
+
+    def settle(self, stage: str, level: Level, shifts: Mapping[float, np.ndarray] = NOTHING) -> float:
+        """Minimise over all windows; the longest misfit of a keyframe [longer side].
+
+        While keyframes are missed, what they are missed by is added to what is aimed at: the method of
+        multipliers (Nocedal & Wright, 17.3). Where that does not halve it the weight is lowered too. `shifts`
+        move the places of keyframes by time, (n, 2) [longer side].
+        """
+        edges, before = self._span.edges, math.inf
+        for _ in range(ROUNDS[stage]):
+            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), shifts)
+            if worst <= NEAR_ENOUGH * self._tolerance:
+                break
+            lower = 1.0 if worst < 0.5 * before else LOWER
+            if self._weight * lower < LEAST_WEIGHT:
+                break
+            self._weight, before = self._weight * lower, worst
+            for t, by in left.items():
+                self._lures[t] = (self._lures.get(t, 0.0) - by) * lower
+        return worst
+
+    def after(self, level: Level, step: int | None = None) -> Level:
+        """The level at the end of the span, or at a step."""
+        step = self._span.edges[-1] if step is None else step
+        journey = Journey(self._span.ways, level.points, [self._time_of(step)], self._unit)
+        functional = self._functional(level, step, journey, self._all_free(), self._weight)
+        state = functional.state_after(functional.start)
+        return Level(level.grid, (self._time_of(step), state), state.points)
+
+    @property
+    def keyed_steps(self) -> list[int]:
+        """The span's steps that end at keyframes."""
+        edges, dt = self._span.edges, self._scene.timeline.dt
+        steps = {round(t / dt) for way in self._span.ways for t in way.particle.times}
+        return sorted(step for step in steps if edges[0] < step <= edges[-1])
+
+    def _name(self, n: int, key: str) -> str:
+        return f"forces[{len(self._scene.given) + n}].{key}"
+
+    def _all_free(self) -> list[Free]:
+        found = list(self._scene.free)
+        for n, (force, scale) in enumerate(zip(self.forces, self._scales, strict=True)):
+            found += [Free(self._name(n, "vector"), scale), Free(self._name(n, "center"), force.radius)]
+        return found
+
+    def _functional(
+        self, level: Level, last: int, journey: Journey, free: Sequence[Free], weight: float
+    ) -> Functional:
+        scene, edges = self._scene, self._span.edges
+        functional = Functional(
+            level.grid,
+            scene.fluid,
+            (*self.given, *self.forces),
+            scene.timeline,
+            journey + (weight / self._typical_effort) * Effort(),
+            free,
+            begin=level.begin,
+            end=self._time_of(last),
+            device=scene.device,
+            like=scene.captured.get(level.grid),
+            room=self._time_of(edges[-1]) - self._time_of(edges[0]),
+        )
+        scene.captured[level.grid] = functional
+        return functional
+
+    def _moments(self, first: int, last: int) -> list[float]:
+        """Times of keyframes in a stretch; between them ends and middles of windows."""
+        edges = self._span.edges
+        steps = {*edges, *((a + b) // 2 for a, b in pairwise(edges)), *self.keyed_steps}
+        return [self._time_of(step) for step in sorted(steps) if first < step <= last]
+
+    def _minimise(
+        self,
+        stage: str,
+        level: Level,
+        steps: tuple[int, int],
+        free: Sequence[Free],
+        shifts: Mapping[float, np.ndarray] = NOTHING,
+    ) -> tuple[float, Mapping[float, np.ndarray]]:
+        """Minimise over what is free, keeping the best; the longest misfit, and all, of keyframes."""
+        log, span = self._log, self._span
+        moments, marches = self._moments(*steps), stage == MARCH
+        guided = span.guided if marches else ()
+        lures, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
+        journey = Journey(span.ways, level.points, moments, self._unit, guided, shifts, lures)
+        functional = self._functional(level, steps[1], journey, free, weight)
+        smooth = Smoothness(self._chains(functional), weight)
+        done, stopped, seen = log.evaluations, False, {}
+
+        def evaluate(m: np.ndarray) -> tuple[float, np.ndarray]:
+            try:
+                value, gradient = functional.value_and_gradient(m)
+            except ValueError as error:  # a force beyond the limit
+                raise FloatingPointError(str(error)) from error
+            seen[m.tobytes()] = journey.worst, dict(journey.left)
+            return smooth.added(value, gradient, m)
+
+        def heed(at: Iterate) -> bool:
+            nonlocal stopped
+            log.evaluations = done + at.evaluations
+            progress = Progress(
+                stage, len(log.history) + 1, log.evaluations, at.value, seen[at.x.tobytes()][0]
+            )
+            log.history.append(progress)
+            stopped = bool(log.heed(progress))
+            near = not marches and progress.worst <= NEAR[stage] * self._tolerance
+            return stopped or near
+
+        settings = Settings(
+            memory=MEMORY,
+            gradient_tolerance=0.0,
+            change_tolerance=CHANGE[stage],
+            evaluations=EVALUATIONS[stage],
+            noise=NOISE,
+        )
+        minimum = minimise(evaluate, functional.start, settings, heed)
+        log.evaluations = done + minimum.evaluations
+        log.seconds.forward += functional.seconds.forward
+        log.seconds.backward += functional.seconds.backward
+        forces = functional.setup(minimum.x).forces
+        self.given, self.forces = forces[: len(self.given)], forces[len(self.given) :]
+        if stopped:
+            raise Stopped
+        return seen.get(minimum.x.tobytes(), (math.inf, {}))
+
+    def _chains(self, functional: Functional) -> list[Chain]:
+        """The entries of each point's forces that vary, in the order of their windows."""
+        entries = {one.name: one.entries for one in functional.variables.slices}
+        rows: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+        for n, (owner, force) in enumerate(zip(self._span.owners, self._span.forces, strict=True)):
+            expected = {"vector": np.zeros(2), "center": np.array(force.center) / force.radius}
+            keys = [key for key in expected if self._name(n, key) in entries]
+            if keys:
+                slices = [entries[self._name(n, key)] for key in keys]
+                own = np.concatenate([np.arange(one.start, one.stop) for one in slices])
+                rows.setdefault(owner, []).append((own, np.concatenate([expected[key] for key in keys])))
+        return [tuple(np.stack(column) for column in zip(*own, strict=True)) for own in rows.values()]
+
+
+Chain = tuple[np.ndarray, np.ndarray]
+"""Entries of a vector, a row a force, and where they are expected."""
+
+
+class Smoothness:
+    """Half the squares of changes, from row to row, of how far entries are from what is expected."""
+
+    def __init__(self, chains: Sequence[Chain], weight: float):
+        self._chains, self._weight = chains, weight
+
+    def added(self, value: float, gradient: np.ndarray, m: np.ndarray) -> tuple[float, np.ndarray]:
+        """A value and its gradient at m, with this and its, times the weight."""
+        gradient = gradient.copy()
+        for entries, expected in self._chains:
+            change = np.diff(m[entries] - expected, axis=0)
+            value += 0.5 * self._weight * float(np.sum(change * change))
+            gradient[entries[1:]] += self._weight * change
+            gradient[entries[:-1]] -= self._weight * change
+        return value, gradient

@@ -1,0 +1,159 @@
+"""The first guess of keyframes: ways that keep apart, and forces along them.
+
+A point's way is a straight line, bent to one side where it would come near another's or a wall: of two
+points that change places on straight lines, each is as well sent round one way as the other, and the
+gradient, which must choose, is 0. Forces are Gaussians at the places where the points are expected, in
+windows of time that all points share, as wide as the points' distance allows: wide ones deform least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from wfluid.domain.envelopes import Constant
+from wfluid.domain.timeline import Timeline
+from wfluid.keyframes.keyframes import Particle
+from wfluid.model.gaussian_forces import GaussianForce
+
+BENDS = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7)
+"""How far ways may bend, in parts of their length; the least that keeps them apart is taken."""
+
+APART = 0.75
+"""Part of their distance at the ends that ways should keep between them."""
+
+WALL_ROOM = 0.01
+"""Distance to a wall that is as good as none [longer side]: ways of points near walls may come nearer."""
+
+WIDEST, NARROWEST = 0.12, 0.006
+"""Radii of forces [longer side]."""
+
+OF_SPACING = 0.5
+"""Radius of a force in parts of the least distance to another point's way."""
+
+LEAST_WINDOWS = 5
+"""Windows of the time to the last keyframe, at least."""
+
+LEAST_STEPS = 2
+"""Steps of a window, at least."""
+
+SAMPLES = 33
+"""Moments at which ways are compared, between two keyframes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """Where a particle is expected."""
+
+    particle: Particle
+    """Whose it is."""
+    bend: float
+    """How far it bends to its left, in parts of the length between two keyframes."""
+
+    def at(self, t: float | np.ndarray) -> np.ndarray:
+        """Where it is expected at a time [longer side], (…, 2); after the last keyframe, where that is."""
+        t = np.asarray(t, dtype=np.float64)
+        out = np.broadcast_to(self.particle.point, (*t.shape, 2)).copy()
+        for n, (start, end, a, b) in enumerate(self._legs()):
+            part = np.clip((t - start) / (end - start), 0, 1)
+            if n == 0:
+                part = part * part * (2 - part)  # it begins at rest
+            d = b - a
+            aside = 4 * part * (1 - part) * self.bend
+            place = a + part[..., None] * d + aside[..., None] * np.array([d[1], -d[0]])
+            out = np.where((t >= start)[..., None], place, out)
+        return out
+
+    def length(self, start: float, end: float) -> float:
+        """How long it is between two times [longer side]."""
+        places = self.at(np.linspace(start, end, SAMPLES))
+        return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+    def _legs(self) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
+        """From keyframe to keyframe: start and end [s], places there [longer side]."""
+        own = self.particle
+        stops = [(0.0, np.array(own.point)), *zip(own.times, own.destinations, strict=True)]
+        for (start, a), (end, b) in pairwise(stops):
+            yield start, end, a, b
+
+
+def ways_of(particles: Sequence[Particle], extent: tuple[float, float], seed: int) -> list[Way]:
+    """Ways that keep apart from one another and from the walls, as well as bends can do it.
+
+    Which side they bend to is the seed's choice, if both are as good.
+    """
+    side = 1.0 if np.random.default_rng(seed).random() < 0.5 else -1.0
+    best, widest = [], -math.inf
+    for bend in BENDS:
+        for sign in (side, -side):
+            ways = [Way(particle, sign * bend) for particle in particles]
+            room = _room(ways, extent)
+            if room > widest + 0.02:
+                best, widest = ways, room
+            if widest >= APART:
+                return best
+    return best
+
+
+def _room(ways: Sequence[Way], extent: tuple[float, float]) -> float:
+    """The least distance between two ways at one time, or to walls, in parts of that at their ends."""
+    times, room = _moments(ways), 1.0
+    places = [way.at(times) for way in ways]
+    stops = [np.searchsorted(times, [0.0, *way.particle.times]) for way in ways]
+    for n, own in enumerate(places):
+        inside = np.minimum(own, np.array(extent) - own).min(axis=1) + WALL_ROOM
+        room = min(room, inside.min() / inside[stops[n]].min())
+        for m in range(n):
+            distance = np.linalg.norm(own - places[m], axis=1)
+            at_ends = min(distance[stops[n]].min(), distance[stops[m]].min())
+            room = min(room, distance.min() / max(at_ends, 1e-9))
+    return room
+
+
+def _moments(ways: Sequence[Way]) -> np.ndarray:
+    """Moments of all keyframes, and some between."""
+    stops = sorted({0.0, *(t for way in ways for t in way.particle.times)})
+    return np.unique(np.concatenate([np.linspace(a, b, SAMPLES) for a, b in pairwise(stops)]))
+
+
+def radii_of(ways: Sequence[Way], factor: float = 1.0) -> list[float]:
+    """The radius of each way's forces [longer side], times a factor within the limits."""
+    times = _moments(ways)
+    places = [way.at(times) for way in ways]
+    found = []
+    for n, own in enumerate(places):
+        others = [np.linalg.norm(own - other, axis=1).min() for m, other in enumerate(places) if m != n]
+        spacing = min(others, default=math.inf)
+        found.append(float(min(WIDEST, max(NARROWEST, factor * OF_SPACING * spacing))))
+    return found
+
+
+def edges_of(ways: Sequence[Way], radii: Sequence[float], timeline: Timeline) -> list[int]:
+    """The steps at which windows begin and end: at keyframes, and between them about a radius apart."""
+    times = sorted({t for way in ways for t in way.particle.times})
+    stops = [0, *(round(t / timeline.dt) for t in times)]
+    edges = [0]
+    for first, last in pairwise(stops):
+        count = LEAST_WINDOWS * (last - first) / stops[-1]
+        for way, radius in zip(ways, radii, strict=True):
+            length = way.length(timeline.time_of(first), timeline.time_of(last))
+            count = max(count, length / radius)
+        count = max(1, min(math.ceil(count - 1e-6), (last - first) // LEAST_STEPS))
+        edges += [round(edge) for edge in np.linspace(first, last, count + 1)[1:]]
+    return edges
+
+
+def forces_along(
+    way: Way, radius: float, edges: Sequence[int], timeline: Timeline
+) -> Iterator[tuple[int, GaussianForce]]:
+    """A force without strength for each window until a way's end, with the window's number."""
+    for window, (first, last) in enumerate(pairwise(edges)):
+        start, end = timeline.time_of(first), timeline.time_of(last)
+        if start >= way.particle.times[-1] - 0.5 * timeline.dt:
+            return
+        x, y = way.at((start + end) / 2)
+        yield window, GaussianForce((float(x), float(y)), (0.0, 0.0), radius, Constant(start, end))

@@ -1,0 +1,1 @@
+"""What moves and resists, as descriptions: fluid, densities, forces."""

@@ -1,0 +1,133 @@
+"""Forces that a picture paints: along the slopes or the contours of its intensity, or drawn as vectors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wfluid.domain.envelopes import Constant, Envelope
+from wfluid.domain.grid import Grid
+from wfluid.domain.operators import before, blurred, mean_with_before
+from wfluid.domain.walls import Walls
+from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
+from wfluid.model.painted import Painted
+from wfluid.pictures.picture import Picture, as_stored, resample
+
+KINDS = ("gradient", "contour", "vectors")
+
+DEFAULT_RADIUS = 0.01
+"""Sigma of the blur before slopes are taken [longer side]: about three pixels of a grid of 256."""
+
+
+_FLAT = 1e-5
+"""Range of intensities below which slopes are rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImageForce(FieldForce):
+    """A force field from a picture, times an envelope (Bonilla & Velho, section III).
+
+    "gradient" pushes towards brighter places, "contour" along lines of equal intensity with the brighter
+    side to the right; both are as strong as said where the blurred picture is steepest. "vectors" reads
+    the first two channels as the force along x (right) and y (down).
+
+    The pressure of an incompressible fluid balances the gradient of any picture wholly: alone it moves
+    nothing. It acts where a `weight` makes it no gradient. Contours are free of divergence and act in full.
+
+    Raises:
+        ValueError: an unknown kind, a value that is not finite, a strength beyond 1e4 longer sides/s^2, a
+            picture without slopes, or one of a single channel where vectors are asked for.
+    """
+
+    picture: Picture | np.ndarray
+    """A picture; or an array (height, width) of intensities, (height, width, 2) of vectors."""
+    kind: str = "gradient"
+    """"gradient", "contour" or "vectors"."""
+    strength: float = 1.0
+    """Acceleration [longer side/s^2] where the slope is steepest, or of vectors of length one; for
+    `Instantaneous` the velocity gained."""
+    envelope: Envelope = field(default_factory=Constant)
+    """Course in time."""
+    weight: Painted | None = None
+    """Where it acts: a factor painted over the picture."""
+    radius: float = DEFAULT_RADIUS
+    """Sigma of the blur before slopes are taken [longer side]; 0 for none."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"ImageForce: kind {self.kind!r}: expected one of {', '.join(KINDS)}")
+        if not abs(self.strength) <= FORCE_LIMIT:
+            raise ValueError(f"ImageForce: strength {self.strength}: expected at most {FORCE_LIMIT:g}")
+        if not (math.isfinite(self.radius) and self.radius >= 0):
+            raise ValueError(f"ImageForce: radius {self.radius}: expected 0 or more")
+        if self.kind != "vectors":
+            values = Painted(self.picture).values
+            if np.ptp(values) == 0:
+                raise ValueError("ImageForce: the picture is the same everywhere, so it has no slopes")
+        else:
+            values = vectors_of(self.picture)
+        object.__setattr__(self, "_values", values)
+
+    @property
+    def reach(self) -> float:
+        """Largest acceleration [longer side/s^2]."""
+        longest = np.linalg.norm(self._values, axis=2).max() if self.kind == "vectors" else 1.0
+        return abs(self.strength) * float(longest)
+
+    def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The force on the faces, as strong as said."""
+        if self.kind == "vectors":
+            centres = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
+            force = [mean_with_before(centres[..., n], 1 - n, walls.periodic[n]) for n in (0, 1)]
+        else:
+            values = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
+            values = blurred(values, grid, self.radius, walls.periodic)
+            if np.ptp(values) < _FLAT:
+                raise ValueError("ImageForce: blurred to the grid's cells the picture has no slopes left")
+            force = _slopes(values, grid, self.kind, walls.periodic)
+            steepest = float(np.hypot(*force).max())
+            force = [f / steepest for f in force]
+        return [on_faces([self.strength * f for f in force], self.weight, grid, walls)]
+
+
+def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
+    """Vectors (height, width, 2): arrays and float files as they are, integers with zero at half range.
+
+    The code 128 of 8-bit files, 32768 of 16-bit ones, is zero; the least and the greatest are about one.
+
+    Raises:
+        ValueError: fewer than two channels, or values that are not finite.
+    """
+    if isinstance(picture, Picture):
+        values, alpha = as_stored(picture), picture.alpha
+        channels = [channel for channel in range(values.shape[2]) if channel != alpha][:2]
+        if len(channels) < 2:
+            raise ValueError("a picture of vectors needs two channels")
+        opacity = 1.0 if alpha is None else values[..., [alpha]]
+        values = values[..., channels]
+        codes = {"uint8": 255, "uint16": 65535}.get(picture.dtype)
+        if codes:
+            values = (values * codes - (codes + 1) / 2) / ((codes - 1) / 2)
+        values = values * opacity
+    else:
+        values = np.asarray(picture, dtype=np.float64)
+        if values.ndim != 3 or values.shape[2] < 2:
+            raise ValueError(f"vectors of shape {values.shape}: expected (height, width, 2)")
+    if not np.isfinite(values[..., :2]).all():
+        raise ValueError("vectors that are not finite")
+    return values[..., :2]
+
+
+def _slopes(values: np.ndarray, grid: Grid, kind: str, periodic: tuple[bool, bool]) -> list[np.ndarray]:
+    """The gradient on faces, or turned a quarter: (d/dy, -d/dx) of the means at nodes."""
+    if kind == "gradient":
+        before_x, before_y = (before(values, axis, periodic[1 - axis]) for axis in (1, 0))
+        return [(values - before_x) / grid.hx, (values - before_y) / grid.hy]
+    padded = values
+    for axis, wraps in ((0, periodic[1]), (1, periodic[0])):
+        width = [(1, 1) if axis == n else (0, 0) for n in (0, 1)]
+        padded = np.pad(padded, width, mode="wrap" if wraps else "edge")
+    nodes = (padded[1:, 1:] + padded[1:, :-1] + padded[:-1, 1:] + padded[:-1, :-1]) / 4
+    return [np.diff(nodes, axis=0)[:, :-1] / grid.hy, -np.diff(nodes, axis=1)[:-1] / grid.hx]

@@ -1,0 +1,199 @@
+"""Values painted over the picture: viscosity and freezing by pictures, arrays and time.
+
+A picture paints by its intensity, 0 … 1 of its number type's range and never of its own darkest and
+brightest values, times a scale (Bonilla & Velho, section III). A painting of any size is stretched over
+the picture and averaged onto the grid's cells.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from wfluid.domain.grid import Grid
+from wfluid.pictures.picture import Picture, intensity, resample
+
+VISCOSITY_LIMIT = 1e3
+"""Largest viscosity the solver is tested with [longer side^2/s]."""
+
+DRAG_LIMIT = 1e6
+"""Largest drag the solver is tested with [1/s]."""
+
+DEFAULT_STRENGTH = 1e4
+"""Drag of full paint [1/s]: at 24 steps a second what is painted moves 1/400 of what is around it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """A quantity painted over the picture: what a picture shows, times a scale.
+
+    Raises:
+        ValueError: a value that is negative or not finite, an array that is not two-dimensional,
+            `invert` of values beyond 0 … 1, or a floor above the scale.
+    """
+
+    picture: Picture | np.ndarray
+    """A picture, whose intensity 0 … 1 counts, or an array (height, width) of values from 0 on."""
+    scale: float = 1.0
+    """What full intensity stands for."""
+    invert: bool = False
+    """Whether dark is much, instead of bright."""
+    floor: float = 0.0
+    """What no intensity stands for."""
+    values: np.ndarray = field(init=False, repr=False)
+    """What is painted, (height, width) of the painting."""
+
+    def __post_init__(self) -> None:
+        is_picture = isinstance(self.picture, Picture)
+        values = intensity(self.picture) if is_picture else np.asarray(self.picture, dtype=np.float64)
+        if values.ndim != 2 or not values.size:
+            raise ValueError(f"painted values of shape {values.shape}: expected (height, width)")
+        _finite_from_zero("painted values", values)
+        for name in ("scale", "floor"):
+            _finite_from_zero(name, np.asarray(getattr(self, name)))
+        if self.invert and values.max() > 1:
+            raise ValueError(f"painted values up to {values.max():g} cannot be inverted: expected 0 … 1")
+        shown = 1.0 - values if self.invert else values
+        object.__setattr__(self, "values", self.floor + (self.scale - self.floor) * shown)
+        if self.floor > self.scale:
+            raise ValueError(f"floor {self.floor:g} is above scale {self.scale:g}")
+
+    def on(self, grid: Grid) -> np.ndarray:
+        """The means over the grid's cells, (ny, nx)."""
+        return _on_grid(self, grid)
+
+    def resampled(self, width: int, height: int) -> np.ndarray:
+        """The means over pixels of another size, (height, width)."""
+        if self.values.shape == (height, width):
+            return self.values.astype(np.float64)
+        values = resample(self.values.astype(np.float32), width, height)
+        return np.clip(values.astype(np.float64), self.values.min(), self.values.max())
+
+
+@dataclass(frozen=True, eq=False)
+class Keyed:
+    """A quantity given at some times, with straight lines between them and no change outside.
+
+    Raises:
+        ValueError: no keys, or a time that is not finite.
+    """
+
+    keys: Mapping[float, float | np.ndarray | Painted]
+    """Value by time [s]."""
+
+    def __post_init__(self) -> None:
+        if not self.keys or not all(math.isfinite(t) for t in self.keys):
+            raise ValueError("Keyed: expected values at one finite time or more")
+        keys = {t: as_quantity("keyed value", value) for t, value in sorted(self.keys.items())}
+        object.__setattr__(self, "keys", keys)
+
+    def at(self, t: float, grid: Grid) -> np.ndarray | float:
+        """The value at time t [s]: one number, or (ny, nx)."""
+        times = list(self.keys)
+        after = bisect_right(times, t)
+        if after in (0, len(times)):
+            return value_on(self.keys[times[max(after - 1, 0)]], grid, t)
+        t0, t1 = times[after - 1], times[after]
+        start, end = (value_on(self.keys[time], grid, t) for time in (t0, t1))
+        return start + (end - start) * ((t - t0) / (t1 - t0))
+
+
+Quantity = float | Painted | Keyed | Callable[[float], object]
+"""What a viscosity may be: one number, a painting, keys over time, or a function of the time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Freeze:
+    """A mask that holds the picture in place where it is painted: drag, by degrees.
+
+    Drag (1 + strength)^m - 1 for paint m of 0 … 1: none where there is none, and each further degree of
+    paint multiplies it, so that a soft edge of the mask is a soft edge of the stillness.
+
+    Raises:
+        ValueError: a strength outside 0 … 1e6, paint outside 0 … 1, or paint over everything, which
+            would leave nothing to move.
+    """
+
+    mask: Picture | np.ndarray
+    """White, or 1, stays; black, or 0, is free."""
+    strength: float = DEFAULT_STRENGTH
+    """Drag of full paint [1/s]."""
+    paint: Painted = field(init=False, repr=False)
+    """The mask's paint."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.strength <= DRAG_LIMIT:
+            raise ValueError(f"freeze strength {self.strength}: expected 0 … {DRAG_LIMIT:g}")
+        object.__setattr__(self, "paint", Painted(self.mask))
+        least, most = self.paint.values.min(), self.paint.values.max()
+        if most > 1:
+            raise ValueError(f"freeze mask with values up to {most:g}: expected 0 … 1")
+        if least > 0.99 and self.strength > 0:
+            raise ValueError(
+                "the freeze mask is painted all over, so nothing could move: leave what should move black"
+            )
+
+    def on(self, grid: Grid) -> np.ndarray:
+        """Drag [1/s] of the grid's cells, (ny, nx)."""
+        return np.expm1(self.paint.on(grid) * math.log1p(self.strength))
+
+
+def as_quantity(name: str, what: Quantity | np.ndarray | Picture) -> Quantity:
+    """A quantity, from what a user may give for one.
+
+    Raises:
+        ValueError: a number outside 0 … 1000, or painted values that are negative or not finite.
+        TypeError: something that is no quantity.
+    """
+    if isinstance(what, Painted | Keyed) or callable(what):
+        return what
+    if isinstance(what, np.ndarray) and what.ndim:
+        return Painted(what)
+    if isinstance(what, Picture):
+        raise TypeError(f"{name}: a picture needs a scale: Painted(picture, scale=…)")
+    if not isinstance(what, int | float | np.number | np.ndarray):
+        raise TypeError(f"{name}: expected a number, an array, Painted, Keyed or a function of the time")
+    if not 0 <= what <= VISCOSITY_LIMIT:
+        raise ValueError(f"{name} {what}: expected 0 … {VISCOSITY_LIMIT:g}")
+    return float(what)
+
+
+def value_on(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
+    """A quantity at time t [s]: one number, or (ny, nx) for the grid's cells.
+
+    Raises:
+        ValueError: a function of the time gave something negative, infinite or of no use.
+    """
+    if isinstance(what, float):
+        return what
+    if isinstance(what, Painted):
+        return what.on(grid)
+    if isinstance(what, Keyed):
+        return what.at(t, grid)
+    return value_on(as_quantity(f"viscosity at {t:g} s", what(t)), grid, t)
+
+
+def check_painted(viscosity: np.ndarray | float) -> None:
+    """Refuse viscosities above the limit.
+
+    Raises:
+        ValueError: with the limit.
+    """
+    if not np.max(viscosity) <= VISCOSITY_LIMIT:
+        raise ValueError(f"viscosity up to {np.max(viscosity):g}: expected 0 … {VISCOSITY_LIMIT:g}")
+
+
+@lru_cache(maxsize=16)
+def _on_grid(painted: Painted, grid: Grid) -> np.ndarray:
+    return painted.resampled(grid.nx, grid.ny)
+
+
+def _finite_from_zero(name: str, values: np.ndarray) -> None:
+    wrong = ~np.isfinite(values) | (values < 0)
+    if wrong.any():
+        raise ValueError(f"{name} with {values[wrong].flat[0]}: expected finite numbers from 0 on")

@@ -1,0 +1,91 @@
+"""A flow's maps between any of its times and its two ends.
+
+`source_of` the start is what the solver carries. The way to the end is found going back: against every
+step's own velocity the displacement to the end is carried from the last step to the first. Both follow the
+same velocities by the same rule, so that one map undoes the other but for what interpolation loses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import Timeline
+from wfluid.domain.walls import Walls
+from wfluid.model.force import Force
+from wfluid.step.solver import Solver
+from wfluid.view.coordinate_map import CoordinateMap
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """What lies at the start, and at the end, for every place at every step of a flow."""
+
+    grid: Grid
+    """The grid of the maps."""
+    walls: Walls
+    """How they go on beyond its edges."""
+    from_start: np.ndarray
+    """Place at the start minus the place itself [longer side], (steps + 1, ny, nx, 2), float32."""
+    to_end: np.ndarray
+    """Place at the end minus the place itself, the same."""
+
+    def since_start(self, part: float | np.ndarray) -> CoordinateMap:
+        """Places at the start of what is there after a part of the time, 0 … 1, or one a cell (ny, nx)."""
+        return CoordinateMap(self.grid, self.walls, _between(self.from_start, part))
+
+    def until_end(self, part: float | np.ndarray) -> CoordinateMap:
+        """Places at the end of what is there after a part of the time, 0 … 1, or one a cell (ny, nx)."""
+        return CoordinateMap(self.grid, self.walls, _between(self.to_end, part))
+
+    def inconsistency(self) -> np.ndarray:
+        """How far from itself a cell's centre comes that goes to the end and back [longer side], (ny, nx)."""
+        there, back = self.until_end(0.0), self.since_start(1.0)
+        ends = there.source_of.reshape(-1, 2)
+        extent = np.array([self.grid.width, self.grid.height])
+        inside = np.where(self.walls.periodic, ends % extent, np.clip(ends, 0.0, extent))
+        again = back.source_at(inside) - inside + ends
+        start = there.source_of - there.displacement
+        return np.linalg.norm(again.reshape(start.shape) - start, axis=2)
+
+
+def _between(maps: np.ndarray, part: float | np.ndarray) -> np.ndarray:
+    """The displacement after a part of the time, on the line between those of the steps around."""
+    steps = len(maps) - 1
+    at = np.clip(np.asarray(part, dtype=np.float64), 0.0, 1.0) * steps
+    step = np.minimum(at.astype(int), steps - 1)
+    rest = (at - step)[..., None].astype(maps.dtype)
+    if step.ndim == 0:
+        before, after = maps[step], maps[step + 1]
+    else:
+        rows, columns = np.indices(step.shape)
+        before, after = maps[step, rows, columns], maps[step + 1, rows, columns]
+    return (1 - rest) * before + rest * after
+
+
+def passage_of(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> Passage:
+    """Run a flow from rest, and back: its maps after every step."""
+    now, spare, walls = solver.rest(), solver.rest(), solver.fluid.walls
+    shape = (timeline.steps + 1, solver.grid.ny, solver.grid.nx, 2)
+    from_start, to_end = (np.zeros(shape, dtype=np.float32) for _ in range(2))
+    velocities = []
+    for step in range(timeline.steps):
+        velocities.append([wp.clone(f) for f in (now.u, now.v)])
+        t, until = timeline.time_of(step), timeline.time_of(step + 1)
+        solver.step(now, spare, forces, t, timeline.dt, until=until)
+        now, spare = spare, now
+        from_start[step + 1] = CoordinateMap.of_state(now, walls).displacement
+    if not np.all(np.isfinite(from_start[-1])):
+        raise FloatingPointError("the flow is no longer finite; use smaller forces or more steps")
+    now, spare = solver.rest(), solver.rest()
+    for step in reversed(range(timeline.steps)):
+        for f, kept in zip((now.u, now.v), velocities.pop(), strict=True):
+            wp.copy(f, kept)
+        solver.carry(now, spare, -timeline.dt)
+        now, spare = spare, now
+        to_end[step] = CoordinateMap.of_state(now, walls).displacement
+    return Passage(solver.grid, walls, from_start, to_end)

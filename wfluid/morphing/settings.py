@@ -1,0 +1,57 @@
+"""The settings of a morph: curves in time, blending, order of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wfluid.domain.curves import DELAY, DELAY_LIMIT, EASE, Curve, curve_of
+from wfluid.domain.timeline import Timeline
+from wfluid.model.painted import Painted
+from wfluid.pictures.blend import check_light
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a morph goes.
+
+    Raises:
+        ValueError: no such curve or light, keys of a curve outside the duration, a delay outside 0 … 0.9.
+    """
+
+    timeline: Timeline
+    """When frames are shown; the first is the one picture, the last the other."""
+    warp_curve: str | Curve | Mapping[float, float] = EASE
+    """How far points are on their ways: "linear", "ease", or values 0 … 1 by time [s]."""
+    blend_curve: str | Curve | Mapping[float, float] = EASE
+    """How much of the second picture is seen, the same."""
+    blend: str = "linear"
+    """What is mixed: "linear" light, or "display" values."""
+    mask: Painted | np.ndarray | None = None
+    """A mask, white where it happens first."""
+    delay: float = DELAY
+    """How much later it happens where the mask is black, a part of the time."""
+    reverse: bool = False
+    """From the second picture to the first: the same frames, the last one first."""
+    pingpong: bool = False
+    """There and back, without end: the frames between are shown again after the last."""
+
+    def __post_init__(self) -> None:
+        for name in ("warp_curve", "blend_curve"):
+            object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.duration))
+        check_light(self.blend)
+        if isinstance(self.mask, np.ndarray):
+            object.__setattr__(self, "mask", Painted(self.mask))
+        if not 0 <= self.delay <= DELAY_LIMIT:
+            raise ValueError(f"delay {self.delay}: expected a part of the time, 0 … {DELAY_LIMIT}")
+        if self.mask is not None and self.mask.values.max() > 1:
+            raise ValueError("a timing mask: expected values 0 … 1")
+
+    @property
+    def order(self) -> list[int]:
+        """The frames by their number from the first picture's on, in the order they are shown."""
+        frames = list(range(self.timeline.frames))
+        frames = frames[::-1] if self.reverse else frames
+        return frames + frames[-2:0:-1] if self.pingpong else frames

@@ -1,0 +1,1 @@
+"""L-BFGS and its line search: a library of its own."""

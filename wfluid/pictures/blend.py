@@ -1,0 +1,51 @@
+"""Two pictures of one kind, mixed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wfluid.pictures import color
+from wfluid.pictures.picture import Picture
+
+LIGHTS = ("linear", "display")
+"""What is mixed: light, or the numbers that a display is sent (sRGB)."""
+
+
+def check_light(light: str) -> None:
+    """Refuse a light that does not exist.
+
+    Raises:
+        ValueError: with those that do.
+    """
+    if light not in LIGHTS:
+        raise ValueError(f"blend in {light!r} light: expected one of {', '.join(LIGHTS)}")
+
+
+def blended(a: Picture, b: Picture, weight: float | np.ndarray, light: str = "linear") -> Picture:
+    """A mix of two pictures of one size: of b so much as `weight` says, a number or (height, width), 0 … 1.
+
+    Where that is 0 or 1 everywhere it is one of them, to the bit.
+    """
+    weight = np.asarray(weight, dtype=np.float32)
+    if not weight.any() or np.all(weight == 1):
+        return a.with_pixels(b.pixels) if weight.all() else a
+    weight = weight[..., None]
+    if light == "linear" or a.data:
+        return a.with_pixels(_mixed(a.pixels, b.pixels, weight))
+    shown = _mixed(_displayed(a.pixels, a.alpha), _displayed(b.pixels, a.alpha), weight)
+    return a.with_pixels(_displayed(shown, a.alpha, color.to_linear))
+
+
+def _mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    return (1 - weight) * a + weight * b
+
+
+def _displayed(pixels: np.ndarray, alpha: int | None, transfer=color.to_srgb) -> np.ndarray:
+    """Premultiplied values, through a transfer function of what is not multiplied."""
+    if alpha is None:
+        return transfer(pixels)
+    opacity = pixels[..., [alpha]]
+    whole = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
+    shown = transfer(whole) * opacity
+    shown[..., [alpha]] = opacity
+    return shown

@@ -1,0 +1,96 @@
+"""What formats of stills can hold, and how they are encoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+COLORSPACES = ("auto", "srgb", "linear", "data")
+
+TYPES = ("uint8", "uint16", "half", "float")
+"""Number types a picture is written with."""
+
+LARGEST = 65504.0
+"""What an infinite value becomes on reading (the largest half): filters would spread it as NaN."""
+
+NUMPY = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
+WRITES = {
+    ".png": ("uint8", "uint16"),
+    ".tif": ("uint8", "uint16", "half", "float"),
+    ".tiff": ("uint8", "uint16", "half", "float"),
+    ".jpg": ("uint8",),
+    ".jpeg": ("uint8",),
+    ".exr": ("half", "float"),
+    ".hdr": ("float",),
+    ".webp": ("uint8",),
+    ".tga": ("uint8",),
+    ".bmp": ("uint8",),
+    ".dpx": ("uint8", "uint16"),
+}
+"""Formats written as stills, and the number types of each, the first one being the default."""
+
+CHANNELS = {".jpg": 3, ".jpeg": 3, ".hdr": 3, ".bmp": 3, ".png": 4, ".webp": 4, ".tga": 4, ".dpx": 4}
+"""Most channels that a format holds, where that is few; with 3 there is no alpha among them."""
+
+_COMPRESSIONS = {
+    ".exr": ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"),
+    ".tif": ("none", "lzw", "zip", "packbits"),
+    ".tiff": ("none", "lzw", "zip", "packbits"),
+}
+QUALITIES = {".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp"}
+
+LINEAR = ("half", "float")
+"""Number types that hold linear light; the others hold sRGB."""
+
+
+class PictureError(ValueError):
+    """A picture that cannot be read or written; the message says which, why and what to do."""
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How a still is written; what is None follows the picture and the format.
+
+    Raises:
+        PictureError: a value that no format has.
+    """
+
+    type: str | None = None
+    """Number type: one of `TYPES`."""
+    compression: str | None = None
+    """Lossless or lossy method, for EXR and TIFF."""
+    quality: int | None = None
+    """1 … 100, for JPEG and WebP."""
+
+    def __post_init__(self) -> None:
+        if self.type is not None and self.type not in TYPES:
+            raise PictureError(f"type {self.type!r}: expected one of {', '.join(TYPES)}")
+        known = sorted({name for names in _COMPRESSIONS.values() for name in names})
+        if self.compression is not None and self.compression not in known:
+            raise PictureError(f"compression {self.compression!r}: expected one of {', '.join(known)}")
+        if self.quality is not None and not 1 <= self.quality <= 100:
+            raise PictureError(f"quality {self.quality}: expected 1 … 100")
+
+    def check(self, path: Path) -> None:
+        """Refuse what the format of `path` does not have.
+
+        Raises:
+            PictureError: an unknown ending, or a setting its format lacks, with what it has.
+        """
+        ending = path.suffix.lower()
+        if ending not in WRITES:
+            raise PictureError(f"{path}: unknown picture format {path.suffix!r}; known: {', '.join(WRITES)}")
+        if self.type is not None and self.type not in WRITES[ending]:
+            raise PictureError(f"{path}: {ending} holds {' or '.join(WRITES[ending])}, not {self.type}")
+        if self.compression is not None and self.compression not in _COMPRESSIONS.get(ending, ()):
+            known = ", ".join(_COMPRESSIONS.get(ending, ())) or "no choice of compression"
+            raise PictureError(
+                f"{path}: compression {self.compression!r} is not for {ending}: it has {known}"
+            )
+        if self.quality is not None and ending not in QUALITIES:
+            raise PictureError(f"{path}: {ending} has no quality; {', '.join(QUALITIES)} have")
+
+
+def first_line(message: str) -> str:
+    """The first line of what a library says, which may be nothing."""
+    return message.strip().splitlines()[0] if message.strip() else "no reason given"

@@ -1,0 +1,145 @@
+"""Pictures: read and written through OpenImageIO, held in linear light with premultiplied alpha."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wfluid.pictures import color
+from wfluid.pictures.formats import LINEAR, NUMPY, PictureError, first_line
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue (Rec. 709)."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image in linear light, alpha premultiplied."""
+
+    pixels: np.ndarray
+    """Values (height, width, channels), float32; row 0 is the top."""
+    alpha: int | None = None
+    """Index of the alpha channel."""
+    dtype: str = "float"
+    """Number type of the file it came from: one of `TYPES`."""
+    metadata: Any = None
+    """The OpenImageIO `ImageSpec` it came with, for writing."""
+    srgb: bool | None = None
+    """Whether the file's numbers were sRGB; None for what its number type says."""
+    data: bool = False
+    """Whether its numbers are no colours, so that no file converts them."""
+
+    @property
+    def width(self) -> int:
+        """Pixels along x."""
+        return self.pixels.shape[1]
+
+    @property
+    def height(self) -> int:
+        """Pixels along y."""
+        return self.pixels.shape[0]
+
+    def resized(self, width: int, height: int) -> Picture:
+        """The picture at another size, filtered so that shrinking does not alias."""
+        if (width, height) == (self.width, self.height):
+            return self
+        return self.with_pixels(resample(self.pixels, width, height, filter=""))
+
+    def shrunk(self, width: int, height: int) -> Picture:
+        """The picture for frames of a size: shrunk where it is larger, so that they do not alias."""
+        return self.resized(min(width, self.width), min(height, self.height))
+
+    def with_pixels(self, pixels: np.ndarray) -> Picture:
+        """The same kind of picture with other pixels."""
+        return replace(self, pixels=pixels)
+
+
+def resample(values: np.ndarray, width: int, height: int, filter: str = "triangle") -> np.ndarray:
+    """Values (rows, columns) or (rows, columns, channels) at another size, without aliasing.
+
+    `filter` is one of OpenImageIO's, widened where it shrinks; "" is its best for pictures, which may
+    overshoot; "triangle" keeps within the range of the values.
+    """
+    import OpenImageIO as oiio
+
+    if values.shape[:2] == (height, width):
+        return values
+    source = oiio.ImageBuf(np.ascontiguousarray(values, dtype=np.float32).reshape(*values.shape[:2], -1))
+    roi = oiio.ROI(0, width, 0, height, 0, 1, 0, source.nchannels)
+    result = oiio.ImageBufAlgo.resize(source, filter, roi=roi)
+    if result.has_error:
+        raise PictureError(f"resizing to {width} x {height} failed ({first_line(result.geterror())})")
+    return result.get_pixels(oiio.FLOAT).reshape(height, width, *values.shape[2:])
+
+
+def as_stored(picture: Picture) -> np.ndarray:
+    """The numbers of the picture's file, integers scaled to 0 … 1, colours not multiplied by alpha."""
+    pixels, alpha = picture.pixels, picture.alpha
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha]
+    stored = pixels.copy()
+    if alpha is not None:
+        opacity = pixels[..., [alpha]]
+        stored[..., colours] = np.divide(
+            pixels[..., colours], opacity, out=np.zeros_like(pixels[..., colours]), where=opacity > 0
+        )
+    if picture.dtype not in LINEAR if picture.srgb is None else picture.srgb:
+        stored[..., colours] = color.to_srgb(stored[..., colours])
+    return stored
+
+
+_RINGING = 1e-3
+"""How far below zero a filter may have left a value that was painted 0."""
+
+
+def intensity(picture: Picture) -> np.ndarray:
+    """Intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
+
+    Luminance of the file's numbers (Rec. 709 weights), which are display values in 8- and 16-bit files;
+    what is above the range is cut off; times alpha.
+
+    Raises:
+        PictureError: a value that is negative or not finite.
+    """
+    pixels, alpha = picture.pixels, picture.alpha
+    wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
+    if wrong.any():
+        raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
+    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
+    weights = LUMINANCE if len(colours) == 3 else (1.0,)
+    stored = as_stored(picture)
+    grey = sum(weight * stored[..., channel] for weight, channel in zip(weights, colours, strict=False))
+    opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
+    return np.round(np.clip(grey, 0.0, 1.0) * opacity, 6)  # full is 1: conversions round below that
+
+
+def encode(picture: Picture, dtype: str, linear: bool, channels: int) -> tuple[np.ndarray, int | None]:
+    """A picture's numbers as a file of at most `channels` channels stores them, and which is alpha.
+
+    With up to three channels there is no alpha. In linear files it stays premultiplied; in display files
+    it is divided out first.
+    """
+    pixels, alpha = picture.pixels, picture.alpha
+    if alpha is not None and channels <= 3:
+        pixels, alpha = np.delete(pixels, alpha, axis=2), None
+    pixels = pixels[..., :channels] if alpha is None or alpha < channels else pixels[..., :3]
+    if channels == 3 and pixels.shape[2] == 2:
+        pixels = pixels[..., :1]
+    kind, srgb = NUMPY[dtype], not linear and not picture.data
+    if linear or alpha is None:
+        return color.encode(pixels, kind, srgb=srgb), alpha
+    opacity = pixels[..., [alpha]]
+    straight = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
+    stored = color.encode(straight, kind, srgb=srgb)
+    stored[..., alpha] = color.encode(pixels[..., alpha], kind, srgb=False)
+    return stored, alpha
+
+
+def display_rgb(picture: Picture) -> np.ndarray:
+    """A picture as 8-bit sRGB (height, width, 3), over black where it is transparent; grey is repeated."""
+    stored, _ = encode(picture, "uint8", linear=False, channels=3)
+    if stored.shape[2] < 3:
+        stored = np.repeat(stored[..., :1], 3, axis=2)
+    return np.ascontiguousarray(stored)

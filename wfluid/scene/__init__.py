@@ -1,0 +1,1 @@
+"""What a scene file says, and how it is checked."""

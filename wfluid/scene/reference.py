@@ -1,0 +1,38 @@
+"""The reference of a scene's keys, as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from wfluid.scene.format import SCENE
+from wfluid.scene.schema import Key, Many, Named, Table, Variants
+
+
+def tables(what=SCENE, path: str = "") -> Iterator[tuple[str, str, Table]]:
+    """Every table with keys: its heading in TOML, what it is for, and itself."""
+    if isinstance(what, Many | Named):
+        name = f"[{path}]" if isinstance(what, Many) else f"{path}.NAME"
+        yield from tables(what.each, name)
+    elif isinstance(what, Variants):
+        for kind, table in what.tables.items():
+            yield f'[{path}] kind = "{kind}"', table.meaning, table
+    elif isinstance(what, Table):
+        yield f"[{path}]" if path else "at the top", what.meaning, what
+        inner = path.strip("[]")
+        for name, key in what.keys.items():
+            yield from tables(key, f"{inner}.{name}" if inner else name)
+
+
+def reference() -> str:
+    """The keys as Markdown: a section a table, a row a key."""
+    lines = []
+    for heading, meaning, table in tables():
+        lines += ["", f"### `{heading}`", "", f"{meaning}.", ""]
+        rows_ = [(name, key) for name, key in table.keys.items() if isinstance(key, Key)]
+        if rows_:
+            lines += ["| key | meaning | type | default |", "| --- | --- | --- | --- |"]
+        for name, key in rows_:
+            unit = f" [{key.unit}]" if key.unit else ""
+            default = "required" if key.required else key.default or ""
+            lines.append(f"| `{name}` | {key.meaning}{unit} | {key.type} | {default} |")
+    return "\n".join(lines).strip() + "\n"

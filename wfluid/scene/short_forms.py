@@ -1,0 +1,150 @@
+"""Forces, densities and moves in the short form of the command line: `621,451:22,15:period=1`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wfluid.scene.format import FORCES
+from wfluid.scene.schema import SchemaError, checked
+
+FORMS = {
+    "push": ("X,Y:DX,DY", "center", "by"),
+    "vortex": ("X,Y:DEGREES", "center", "turn"),
+    "grow": ("X,Y:FACTOR", "center", "factor"),
+    "stroke": ("X,Y/X,Y/…", "points"),
+    "wind": ("DX,DY", "by"),
+    "noise": ("PIXELS", "amount"),
+    "image": ("FILE", "file"),
+    "ink": ("X,Y:#RRGGBB", "center", "color"),
+    "smoke": ("X,Y:#RRGGBB", "center", "color"),
+}
+"""By kind: how it is written, and the keys of what comes before the options."""
+
+_DENSITY_KEYS = ("diffusion", "lift")
+"""Keys of a poured density that are not its source's."""
+
+_SOURCE_KEYS = ("radius", "amount", "start", "end", "at", "rise", "fall", "strength")
+
+_UNWRITTEN = ("path", "envelope", "points", "name", "group")
+"""Keys that have no short form."""
+
+
+def parse_force(kind: str, text: str) -> dict[str, Any]:
+    """The table of a force from its short form, such as push "X,Y:DX,DY:key=value,…".
+
+    Raises:
+        ValueError: naming the part that is wrong.
+    """
+    what = f"{kind} {text!r}"
+    _, *positional = FORMS[kind]
+    keys = [key for key in FORCES[kind].keys if key not in (*positional, *_UNWRITTEN)]
+    table = _parsed(kind, text, keys)
+    try:
+        return {"kind": kind, **checked(FORCES[kind], table)}
+    except SchemaError as error:
+        raise ValueError(f"{what}: {error}") from None
+
+
+def parse_density(look: str, text: str, name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """The table of a density poured at a point, and that of its buoyancy, from "X,Y:#RRGGBB:key=value,…".
+
+    `lift` is how far its own buoyancy carries it upwards where it is 1 [px].
+
+    Raises:
+        ValueError: naming the part that is wrong.
+    """
+    source = _parsed(look, text, [*_SOURCE_KEYS, *_DENSITY_KEYS])
+    density = {"name": name, "color": source.pop("color"), "look": look}
+    if "diffusion" in source:
+        density["diffusion"] = source.pop("diffusion")
+    lift = source.pop("lift", None)
+    density["source"] = [source]
+    if lift is None:
+        return density, None
+    return density, {"kind": "buoyancy", "density": name, "by": [0.0, -lift]}
+
+
+def _parsed(kind: str, text: str, keys: list[str]) -> dict[str, Any]:
+    """The parts of a short form, by key."""
+    what, (form, *positional) = f"{kind} {text!r}", FORMS[kind]
+    if kind == "image":
+        name, colon, options = text.rpartition(":")
+        parts = [name, options] if colon and "=" in options else [text]
+    else:
+        parts = text.split(":")
+    if len(parts) not in (len(positional), len(positional) + 1):
+        raise ValueError(f"{what}: expected {form} or {form}:key=value,…")
+    table = {key: _part(what, key, part) for key, part in zip(positional, parts, strict=False)}
+    if len(parts) > len(positional):
+        table |= _options(what, parts[-1], keys)
+    return table
+
+
+def _part(what: str, key: str, part: str) -> Any:
+    if key in ("file", "color"):
+        return part
+    if key == "points":
+        return [as_pair(what, "a point X,Y", point) for point in part.split("/")]
+    if key == "center":
+        return as_pair(what, "the point X,Y", part)
+    return as_pair(what, "the arrow DX,DY", part) if key == "by" else as_number(what, key, part)
+
+
+def _options(what: str, text: str, keys: list[str]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    for item in text.split(","):
+        key, equals, value = (part.strip() for part in item.partition("="))
+        if not equals or key not in keys:
+            raise ValueError(f"{what}: {item!r} is not key=value with a key of {', '.join(keys)}")
+        if key in options:
+            raise ValueError(f"{what}: {key} is given twice")
+        options[key] = _option(what, key, value)
+    return options
+
+
+def _option(what: str, key: str, value: str) -> Any:
+    if key in ("mask", "along"):
+        return value
+    return int(value) if key == "seed" and value.isdecimal() else as_number(what, key, value)
+
+
+def as_pair(what: str, name: str, part: str) -> list[float]:
+    """Two numbers, "X,Y".
+
+    Raises:
+        ValueError: not two, or no numbers; begins with `what`.
+    """
+    numbers = part.split(",")
+    if len(numbers) != 2:
+        raise ValueError(f"{what}: {name} needs two numbers, got {part!r}")
+    return [as_number(what, name, number) for number in numbers]
+
+
+def as_number(what: str, name: str, part: str) -> float:
+    """A finite number.
+
+    Raises:
+        ValueError: no number; begins with `what`.
+    """
+    try:
+        value = float(part)
+    except ValueError:
+        raise ValueError(f"{what}: {name}: {part!r} is not a number") from None
+    if value - value != 0:
+        raise ValueError(f"{what}: {name}: {part} is not finite")
+    return value
+
+
+def parse_move(text: str) -> dict[str, Any]:
+    """The table of a move from its short form, "X0,Y0:X1,Y1" or "X0,Y0:X1,Y1@SECONDS".
+
+    Raises:
+        ValueError: naming the part that is wrong.
+    """
+    what = f"move {text!r}"
+    places, at, time = text.partition("@")
+    parts = places.split(":")
+    if len(parts) != 2:
+        raise ValueError(f"{what}: expected X0,Y0:X1,Y1 or X0,Y0:X1,Y1@SECONDS")
+    start, end = (as_pair(what, "a point X,Y", part) for part in parts)
+    return {"from": start, "to": end, **({"time": as_number(what, "time", time)} if at else {})}

@@ -1,0 +1,96 @@
+"""Scenes as TOML files, with the line of what is wrong."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import tomlkit
+from tomlkit.exceptions import ParseError, TOMLKitError
+
+from wfluid.pictures.formats import PictureError
+from wfluid.scene.scene import Scene
+from wfluid.scene.schema import SceneError
+from wfluid.system.atomic import whole_file
+
+
+def read_scene(path: str | os.PathLike) -> Scene:
+    """The scene in a TOML file.
+
+    Raises:
+        SceneError: no such file, no TOML (with line and column), or keys that are wrong.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise SceneError(f"{path}: no such scene") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(
+            f"{path}: cannot be read ({getattr(error, 'strerror', None) or 'no UTF-8'})"
+        ) from None
+    try:
+        tables = tomlkit.parse(text).unwrap()
+    except ParseError as error:
+        reason = re.sub(r" at line \d+ col \d+$", "", str(error))
+        raise SceneError(f"{path}:{error.line}:{error.col}: no TOML: {reason}") from None
+    except TOMLKitError as error:
+        raise SceneError(f"{path}:{_line_of_failure(text)}:1: no TOML: {error}") from None
+    return Scene(tables, path.parent, str(path), _lines_of(text))
+
+
+def write_scene(path: str | os.PathLike, scene: Scene) -> None:
+    """Write a scene as TOML, whole or not at all, its names of files relative to it.
+
+    Raises:
+        PictureError: the file cannot be written.
+    """
+    path = Path(path)
+    document = tomlkit.document()
+    for key, value in scene.moved(path.parent).tables.items():
+        document[key] = value
+    try:
+        with whole_file(path) as temporary:
+            temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def _line_of_failure(text: str) -> int:
+    """The first line that makes a text wrong which is well formed, such as a key given twice."""
+    lines = text.splitlines(keepends=True)
+    for number in range(1, len(lines)):
+        try:
+            tomlkit.parse("".join(lines[:number]))
+        except ParseError:
+            continue  # the middle of a value of several lines
+        except TOMLKitError:
+            return number
+    return len(lines)
+
+
+_HEADING = re.compile(r"""^\s*\[(\[)?([\w."'\s-]+)\]\]?\s*(#.*)?$""")
+_SETTING = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
+
+
+def _lines_of(text: str) -> dict[tuple, int]:
+    """Line by path, of headings and of keys at the beginning of a line."""
+    found: dict[tuple, int] = {}
+    counts: dict[tuple, int] = {}
+    table: tuple = ()
+    for number, line in enumerate(text.splitlines(), start=1):
+        if heading := _HEADING.match(line):
+            table = ()
+            steps = [step.strip(" \"'") for step in heading[2].split(".")]
+            for n, step in enumerate(steps):
+                table = (*table, step)
+                if heading[1] and n == len(steps) - 1:
+                    found.setdefault(table, number)
+                    counts[table] = counts.get(table, -1) + 1
+                if table in counts:
+                    table = (*table, counts[table])
+            found.setdefault(table, number)
+        elif setting := _SETTING.match(line):
+            found.setdefault((*table, *(step.strip(" \"'") for step in setting[1].split("."))), number)
+    return found

@@ -1,0 +1,1 @@
+"""Linear solves: multigrid, Chebyshev sweeps, conjugate gradients, Jacobi."""

@@ -1,0 +1,166 @@
+"""The controls drawn on the picture: what the numbers of a scene mean, without running it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from wfluid.animation.animation import Animation
+from wfluid.model.force import flat
+from wfluid.model.painted import Painted
+from wfluid.pictures.picture import Picture, resample
+from wfluid.scene.scene import Scene
+from wfluid.staging.aims import Aims
+from wfluid.staging.drawing import DEFAULT_RADIUS
+
+COLOURS = ((1.0, 0.75, 0.0), (0.0, 0.8, 1.0), (1.0, 0.2, 0.6), (0.4, 1.0, 0.2))
+"""One a force, in turn; linear light."""
+
+STIFF, FROZEN = (1.0, 0.35, 0.0), (0.0, 0.35, 1.0)
+"""Tints of what viscosity stiffens, by its part of the stiffest, and of what is frozen; linear light."""
+
+_TINT = 0.6
+
+Line = Sequence[tuple[float, float]]
+"""A polyline in pixels."""
+
+
+def draw_controls(scene: Scene, animation: Animation, aims: Aims | None = None) -> Picture:
+    """The picture with what is drawn on it: arrows, circles at radii (one sigma), paths, followed points;
+    keyframes as arrows, pins as crosses.
+
+    A painted viscosity and what is frozen are tinted, orange and blue; what an effect mask spares is
+    dark.
+    """
+    picture, fluid = animation.picture, animation.fluid
+    weights = {id(force.weight): force.weight for force in flat(animation.forces) if force.weight}
+    colours = _tinted(picture, fluid.viscosity, fluid.freeze, list(weights.values()))
+    canvas = _Canvas(colours)
+    frame_width, frame_height = scene.tables["picture"].get("size", (picture.width, picture.height))
+    side = max(frame_width, frame_height)
+    stretch = picture.width / frame_width, picture.height / frame_height
+    shapes = [_force(table, side) for table in scene.tables.get("force", [])]
+    for density in scene.tables.get("density", []):
+        shapes += [_spot(source, side) for source in density.get("source", []) if "image" not in source]
+    for number, lines in enumerate(shapes):
+        for line in lines:
+            canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
+    for number, keyframe in enumerate(aims.keyframes if aims else ()):
+        start, tip = (tuple(side * value for value in at) for at in (keyframe.point, keyframe.destination))
+        for line in _arrow(start, tip, side):
+            canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
+    pins = [(x * side, y * side) for x, y in aims.pins] if aims else []
+    for x, y in [*scene.tables.get("tracks", {}).get("points", []), *pins]:
+        arm = 0.01 * side
+        for line in ([(x - arm, y), (x + arm, y)], [(x, y - arm), (x, y + arm)]):
+            canvas.draw([(a * stretch[0], b * stretch[1]) for a, b in line], (1.0, 1.0, 1.0))
+    return Picture(canvas.pixels(), None, "uint8", None)
+
+
+def _force(table: Mapping[str, Any], side: float) -> Iterator[Line]:
+    """The lines that draw a force."""
+    kind = table["kind"]
+    if kind == "stroke":
+        points = table.get("points") or [row[1:] for row in table["path"]]
+        yield points
+        yield from _head(points[-2], points[-1], side)
+    if kind in ("push", "vortex", "grow"):
+        yield from _spot(table, side)
+        (x, y), radius = _first(table), table.get("radius", DEFAULT_RADIUS * side)
+        if kind == "push":
+            yield from _arrow((x, y), (x + table["by"][0], y + table["by"][1]), side)
+        elif kind == "vortex":
+            turn = math.radians(table["turn"])
+            arc = [
+                (x + 0.6 * radius * math.cos(a), y + 0.6 * radius * math.sin(a))
+                for a in np.linspace(0, max(-6.0, min(6.0, turn)), 49)
+            ]
+            yield arc
+            yield from _head(arc[-2], arc[-1], side)
+        else:
+            ends = (0.5, 1.0) if table["factor"] >= 1 else (1.0, 0.5)
+            for a in np.arange(4) * math.pi / 2 + math.pi / 4:
+                c, s = radius * math.cos(a), radius * math.sin(a)
+                yield from _arrow(
+                    (x + ends[0] * c, y + ends[0] * s), (x + ends[1] * c, y + ends[1] * s), side
+                )
+    if kind == "wind":
+        at = (0.05 * side, 0.05 * side)
+        yield from _arrow(at, (at[0] + table["by"][0], at[1] + table["by"][1]), side)
+
+
+def _spot(table: Mapping[str, Any], side: float) -> Iterator[Line]:
+    """A circle at a spot's radius, and the way it takes."""
+    (x, y), radius = _first(table), table.get("radius", DEFAULT_RADIUS * side)
+    turn = np.linspace(0, 2 * math.pi, 73)
+    yield list(zip(x + radius * np.cos(turn), y + radius * np.sin(turn), strict=True))
+    if "path" in table:
+        yield [(row[1], row[2]) for row in table["path"]]
+
+
+def _first(table: Mapping[str, Any]) -> tuple[float, float]:
+    x, y = table["center"] if "center" in table else table["path"][0][1:]
+    return x, y
+
+
+def _arrow(start: tuple[float, float], tip: tuple[float, float], side: float) -> Iterator[Line]:
+    yield [start, tip]
+    yield from _head(start, tip, side)
+
+
+def _head(start: Sequence[float], tip: Sequence[float], side: float) -> Iterator[Line]:
+    """The two wings of an arrow's head."""
+    back, wing = math.atan2(start[1] - tip[1], start[0] - tip[0]), max(6.0, 0.02 * side)
+    for spread in (0.45, -0.45):
+        end = tip[0] + wing * math.cos(back + spread), tip[1] + wing * math.sin(back + spread)
+        yield [(tip[0], tip[1]), end]
+
+
+def _tinted(picture: Picture, viscosity, freeze, weights: Sequence[Painted]) -> np.ndarray:
+    """The picture's colours, a little darker, under the tints of what is painted."""
+    height, width, channels = picture.pixels.shape
+    colours = picture.pixels[..., :3] if channels >= 3 else np.repeat(picture.pixels[..., :1], 3, axis=2)
+    colours = np.clip(colours, 0, 1) * 0.8
+    for painted, tint in (
+        (viscosity if isinstance(viscosity, Painted) else None, STIFF),
+        (freeze.paint if freeze else None, FROZEN),
+    ):
+        if painted is not None and painted.values.max() > 0:
+            part = resample((painted.values / painted.values.max()).astype(np.float32), width, height)
+            colours += _TINT * part[..., None] * (np.array(tint, dtype=np.float32) - colours)
+    if weights:
+        most = np.max([resample(_clipped(weight), width, height) for weight in weights], axis=0)
+        colours *= 0.3 + 0.7 * most[..., None]
+    return colours
+
+
+def _clipped(weight: Painted) -> np.ndarray:
+    return np.minimum(weight.values, 1.0).astype(np.float32)
+
+
+class _Canvas:
+    """Draws lines on colours."""
+
+    def __init__(self, colours: np.ndarray):
+        import OpenImageIO as oiio
+
+        self._oiio, self._shape = oiio, colours.shape
+        self._image = oiio.ImageBuf(np.ascontiguousarray(colours, dtype=np.float32))
+        self._thick = max(1, max(colours.shape[:2]) // 400)
+
+    def draw(self, points: Line, colour: tuple[float, float, float]) -> None:
+        """A polyline."""
+        for (x0, y0), (x1, y1) in pairwise(points):
+            for shift in range(self._thick):
+                a = (round(x0) + shift, round(y0)), (round(x1) + shift, round(y1))
+                b = (round(x0), round(y0) + shift), (round(x1), round(y1) + shift)
+                for start, end in (a, b):
+                    self._oiio.ImageBufAlgo.render_line(self._image, *start, *end, (*colour, 1.0))
+
+    def pixels(self) -> np.ndarray:
+        """What is drawn, (height, width, 3)."""
+        return self._image.get_pixels(self._oiio.FLOAT).reshape(self._shape).astype(np.float32)

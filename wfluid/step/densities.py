@@ -1,0 +1,154 @@
+"""A density's part of a step: carried along the flow, poured by its sources, diffused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.arrays import Vector, field, from_numpy
+from wfluid.fields.ghosts import Ghosts
+from wfluid.kernels.adjoint import transport as transport_adjoint
+from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.solve import sums
+from wfluid.kernels.step import sources, transport
+from wfluid.model.densities import Density, PaintedSource, Source
+from wfluid.model.fluid import Fluid
+from wfluid.solve.multigrid import Points
+from wfluid.solve.system import Solve
+from wfluid.step.diffusion import ScalarDiffusion
+from wfluid.step.gaussians import Blobs
+
+
+class Pouring:
+    """The sources of one density."""
+
+    def __init__(self, density: Density, grid: Grid, walls: Walls, device: wp.Device, gradients: bool):
+        self.device, self.layout = device, Layout(grid.nx, grid.ny)
+        self._round = [n for n, source in enumerate(density.sources) if isinstance(source, Source)]
+        self.blobs = Blobs(len(self._round), grid, walls, device, gradients) if self._round else None
+        self._painted = [n for n, source in enumerate(density.sources) if isinstance(source, PaintedSource)]
+        self._fields = [field(self.layout, device) for _ in self._painted]
+        for n, f in zip(self._painted, self._fields, strict=True):
+            from_numpy(density.sources[n].paint.on(grid), f, self.layout)
+        self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
+
+    blobs: Blobs | None
+    """The round sources."""
+
+    @property
+    def painted(self) -> int:
+        """How many sources are painted."""
+        return len(self._painted)
+
+    def bind(self, impulses: wp.array, impulses_bar: wp.array) -> None:
+        """Where the painted sources' impulses are on the device, and their gradients."""
+        self._impulses, self._impulses_bar = impulses, impulses_bar
+
+    def impulses(self, density: Density, start: float, end: float) -> list[float]:
+        """What the painted sources do from `start` to `end` [s]."""
+        return [density.sources[n].envelope.integral(start, end) for n in self._painted]
+
+    def row(self, density: Density, start: float, end: float, live: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers and boxes of the round sources; `live` as for `Impulses.row`."""
+        poured = [density.sources[n] for n in self._round]
+        alive = [live and source.envelope.acts(start, end) for source in poured]
+        return self.blobs.row([source.over(start, end) for source in poured], alive)
+
+    def add(self, rho: wp.array) -> None:
+        """Add what they pour to the density, in place: launches only."""
+        if self.blobs:
+            self.blobs.pour(rho)
+        for n, f in enumerate(self._fields):
+            inputs = [f, self._impulses[n : n + 1]]
+            sources.pour_field.launch(self.layout, self.device, inputs, [rho])
+
+    def adjoint(self, rho_bar: wp.array) -> None:
+        """The transpose of `add` with respect to the sources' numbers: launches only."""
+        if self.blobs:
+            self.blobs.measure_centres(rho_bar)
+        nx, ny, pitch = self.layout.nx, self.layout.ny, self.layout.pitch
+        for n, f in enumerate(self._fields):
+            sums.row_products.launch(ny, self.device, [rho_bar, f, nx, pitch, 0], [self._rows])
+            out = self._impulses_bar[n : n + 1]
+            sums.mean_of.launch(1, self.device, [self._rows, ny, 1], [out])
+
+    def gradients(
+        self, numbers: np.ndarray, moments: np.ndarray, impulses_bar: np.ndarray
+    ) -> dict[int, np.ndarray]:
+        """For each source, by its number, the gradient with respect to what it does in each step."""
+        bars = {n: column[:, None] for n, column in zip(self._painted, impulses_bar.T, strict=True)}
+        if self.blobs:
+            table = self.blobs.pour_gradient(numbers, moments)
+            bars.update((n, table[:, :, place].T) for place, n in enumerate(self._round))
+        return bars
+
+
+class DensityTransport:
+    """Steps one density of a fluid."""
+
+    def __init__(self, density: Density, grid: Grid, fluid: Fluid, device: wp.Device):
+        self.density, self.device, self.layout = density, device, Layout(grid.nx, grid.ny)
+        rules = fluid.walls.centre_rules()
+        self._ghosts = Ghosts(self.layout, rules, device)
+        self._diffusion = None
+        if density.diffusion:
+            self._diffusion = ScalarDiffusion(grid, fluid, Points(rules), device, conserved=True)
+        self._carried = field(self.layout, device)
+        self._initial = None if density.initial is None else density.initial.on(grid)
+
+    def begin(self, rho: wp.array) -> None:
+        """Give a density its initial values."""
+        if self._initial is not None:
+            from_numpy(self._initial, rho, self.layout)
+            self._ghosts.fill(rho)
+
+    def plan(self, dt: float) -> Solve:
+        """Make ready for steps of dt; what the diffusion's solve will be."""
+        return self._diffusion.plan(dt * self.density.diffusion) if self._diffusion else Solve("none", 0)
+
+    def _diffuses(self) -> bool:
+        return bool(self._diffusion and self._diffusion.how.iterations)
+
+    def advance(
+        self,
+        rho: wp.array,
+        foot: Vector,
+        where: Sequence[int],
+        pour: Callable[[wp.array], None],
+        out: wp.array,
+    ) -> None:
+        """Out = the density a step later, with ghosts; `pour` adds what its sources do: launches only."""
+        carried = self._carried if self._diffuses() else out
+        transport.carry_density.launch(self.layout, self.device, [rho, *foot, *where], [carried])
+        pour(carried)
+        self._ghosts.fill(carried)
+        if self._diffuses():
+            self._diffusion.diffuse(carried, out)
+
+    def adjoint(
+        self,
+        out_bar: wp.array,
+        rho: wp.array,
+        foot: Vector,
+        where: Sequence[int],
+        pour_adjoint: Callable[[wp.array], None],
+        rho_bar: wp.array,
+        foot_bar: Vector,
+    ) -> None:
+        """The transpose of `advance`: adds to `rho_bar`, writes `foot_bar`: launches only."""
+        carried_bar = out_bar
+        if self._diffuses():
+            carried_bar = self._carried
+            self._diffusion.adjoint(out_bar, carried_bar)
+        pour_adjoint(carried_bar)
+        inputs, outputs = [rho, *foot, carried_bar, *where], [rho_bar, *foot_bar]
+        transport_adjoint.carry_density_adjoint.launch(self.layout, self.device, inputs, outputs, turn=0)
+
+    def fold(self, rho_bar: wp.array) -> None:
+        """Add the gradients with respect to ghosts to those of the cells they copy."""
+        self._ghosts.fold(rho_bar)

@@ -1,0 +1,230 @@
+"""The diffusion of a step: implicit Euler, constant viscosity apart for u and v, else both together.
+
+Both solve for the change that the diffusion makes to what drag alone would leave, A d = v - A v0 with
+v0 = v / (1 + dt alpha). That keeps uniform motion exact and the solver's tolerance one of the change;
+with a symmetric solver M the adjoint is v0 -> v0 + (1 - A) M in opposite order.
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.fields.arrays import Vector, vector
+from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.cell.strips import alone, together
+from wfluid.kernels.solve import algebra, sums
+from wfluid.model.fluid import Fluid
+from wfluid.solve.multigrid import Points, hierarchy
+from wfluid.solve.operators import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, Stress
+from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, Solve, conjugate_gradients
+from wfluid.step.coefficients import Medium
+
+SURE_TOLERANCE = 1e-4
+"""Tolerance from which on the coupled equation is solved by conjugate gradients, which know when they are
+there, instead of a number of cycles that was measured to do."""
+
+
+class ScalarDiffusion:
+    """(1 - dt mu Lap) f' = f for one field and constant mu.
+
+    With `conserved`, for densities, the sum of f is kept to rounding however far the solve goes. The
+    weights of its sweeps are one number, so they keep it; the little that cycles on grids of odd sizes
+    change is taken off evenly.
+    """
+
+    def __init__(self, grid: Grid, fluid: Fluid, points: Points, device: wp.Device, conserved: bool = False):
+        self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
+        self._conserved = conserved
+        if conserved:
+            self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=device)
+            self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
+            self._mean = wp.zeros(1, dtype=Real, device=device)
+        size = (grid.width, grid.height)
+        levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
+        self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL)
+        self.how = Solve("none", 0)
+        self._change, self._answer = (vector(self.layout, device, 1) for _ in range(2))
+        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._dt_mu = -1.0
+
+    def plan(self, dt_mu: float) -> Solve:
+        """Make ready for steps of dt times mu; what the solve will be, "none" where nothing diffuses."""
+        if dt_mu == self._dt_mu:
+            return self.how
+        self.how = Solve("none", 0)
+        if dt_mu > 0:
+            for level in self.system.levels:
+                level.set_coefficients(1.0, dt_mu)
+            self.system.invert_coarsest()
+            self.how = self._choose()
+            self.system.prepare(self.how)
+        self._dt_mu = dt_mu
+        return self.how
+
+    def _choose(self) -> Solve:
+        if self.fluid.solver == "jacobi":
+            return Solve("jacobi", self.fluid.sweeps)
+        top, tolerance = self.system.levels[0], self.fluid.diffusion_tolerance
+        sweeps = self.system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
+        return sweeps or self.system.plan_cycles(tolerance)
+
+    def diffuse(self, f: wp.array, out: wp.array) -> None:
+        """Out = f (with ghosts) diffused, with ghosts."""
+        top = self.system.levels[0]
+        top.residual((f,), (f,), self._change)
+        self.system.solve(self.how, self._change, self._answer)
+        if self._conserved and self.how.method == "multigrid":
+            self._balance(*self._answer)
+        inputs = [f, *self._answer, self._one]
+        algebra.add_scaled.launch(self.layout, self.device, inputs, [out])
+        top.fill((out,))
+
+    def adjoint(self, out_bar: wp.array, f_bar: wp.array) -> None:
+        """The transpose of `diffuse`, without ghosts: f_bar = out_bar + (1 - A) M out_bar."""
+        top, b = self.system.levels[0], self._change
+        alone(lambda: wp.copy(b[0], out_bar))
+        if self._conserved and self.how.method == "multigrid":
+            self._balance(*b)
+        self.system.solve(self.how, b, self._answer)
+        top.residual(self._answer, self._answer, b)
+        algebra.add_scaled.launch(self.layout, self.device, [out_bar, *b, self._one], [f_bar])
+
+    @property
+    def adjoint_answer(self) -> wp.array:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return self._answer[0]
+
+    def _balance(self, change: wp.array) -> None:
+        """Take its mean off a change."""
+        nx, ny, device = self.layout.nx, self.layout.ny, self.device
+        inputs = [change, self._ones, nx, self.layout.pitch, 0]
+        sums.row_products.launch(ny, device, inputs, [self._rows])
+        sums.mean_of.launch(1, device, [self._rows, ny, nx * ny], [self._mean])
+        algebra.lower.launch(self.layout, device, [self._mean], [change])
+
+    def measure(self) -> Residual:
+        """What the last solve left, relative to the change it made."""
+        if not self.how.iterations:
+            return Residual("none", 0, 0.0, 0.0)
+        return self.system.measure(self.how, self._change, self._answer)
+
+
+class SeparateDiffusion:
+    """(1 - dt mu Lap) v' = v for constant mu, one component apart from the other.
+
+    After the projection that equals the coupled equation between periodic and free-slip walls; at a
+    no-slip wall it does not.
+    """
+
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+        self.fluid, walls = fluid, fluid.walls
+        points = (Points(walls.u_rules(), (True, False)), Points(walls.v_rules(), (False, True)))
+        self.components = [ScalarDiffusion(grid, fluid, own, device) for own in points]
+        self.out = vector(Layout(grid.nx, grid.ny), device, 2)
+
+    @property
+    def how(self) -> Solve:
+        """How both are solved."""
+        return self.components[0].how
+
+    def plan(self, dt: float) -> Solve:
+        """Make ready for steps of dt; what the solve will be, "none" where nothing diffuses."""
+        for component in self.components:
+            component.plan(dt * self.fluid.viscosity)
+        return self.how
+
+    def diffuse(self, velocity: Vector) -> None:
+        """Out = the velocity (with ghosts) diffused, with ghosts."""
+        for component, f, out in zip(self.components, velocity, self.out, strict=True):
+            component.diffuse(f, out)
+
+    def adjoint(self, out_bar: Vector, f_bar: Vector) -> None:
+        """The transpose of `diffuse`, without ghosts."""
+        for component, bar, to in zip(self.components, out_bar, f_bar, strict=True):
+            component.adjoint(bar, to)
+
+    @property
+    def adjoint_answer(self) -> Vector:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return tuple(component.adjoint_answer for component in self.components)
+
+    def measure(self) -> Residual:
+        """What the last solve for u left, relative to the change it made."""
+        return self.components[0].measure()
+
+
+class CoupledDiffusion:
+    """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
+
+    def __init__(self, fluid: Fluid, medium: Medium, device: wp.Device, jump_tolerance: float = 1.0):
+        self._jump_tolerance = jump_tolerance
+        self.fluid, self.medium, self.device = fluid, medium, device
+        self.layout = medium.levels[0].layout
+        levels = [Stress(level, medium.size, fluid.walls, device) for level in medium.levels]
+        self.system = LinearSystem(levels, device, STRESS_INTERVAL)
+        self.how = Solve("none", 0)
+        self.out, self._start, self._change, self._answer = (vector(self.layout, device, 2) for _ in range(4))
+        self._one = wp.array([1.0], dtype=Real, device=device)
+
+    def plan(self, dt: float) -> Solve:
+        """Take the step and the medium's bounds; what the solve will be. `prepare` must follow."""
+        stiffness, tolerance = self.medium.stiffness(dt), self.fluid.diffusion_tolerance
+        self._norm = stiffness.greatest
+        for depth, level in enumerate(self.system.levels):
+            level.set_step(dt, 0.0 if depth else stiffness.least)
+        if self.fluid.solver == "jacobi":
+            self.how = Solve("jacobi", self.fluid.sweeps)
+        elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
+            self.how = sweeps
+        elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:
+            self.how = conjugate_gradients(min(tolerance, self._jump_tolerance))
+        else:
+            self.how = self.system.plan_cycles(tolerance)
+        self.system.prepare(self.how)
+        return self.how
+
+    def prepare(self) -> None:
+        """Follow the medium: launches only."""
+        for level in self.system.levels:
+            level.weigh()
+        self.system.invert_coarsest()
+
+    def diffuse(self, velocity: Vector) -> None:
+        """Out = the velocity (with ghosts) diffused, with ghosts."""
+        top = self.system.levels[0]
+        with together():
+            for f, beta, start in zip(velocity, self.medium.levels[0].beta, self._start, strict=True):
+                algebra.dragged.launch(self.layout, self.device, [f, beta], [start])
+        top.fill(self._start)
+        top.residual(velocity, self._start, self._change)
+        self.system.solve(self.how, self._change, self._answer, whole=velocity)
+        with together():
+            for f, change, out in zip(self._start, self._answer, self.out, strict=True):
+                algebra.add_scaled.launch(self.layout, self.device, [f, change, self._one], [out])
+        top.fill(self.out)
+
+    def adjoint(self, out_bar: Vector, f_bar: Vector) -> None:
+        """The transpose of `diffuse`, without ghosts: f_bar = beta (out_bar - A lambda) + lambda."""
+        top, beta = self.system.levels[0], self.medium.levels[0].beta
+        answer = self._answer
+        self.system.solve(self.how, out_bar, answer, whole=out_bar)
+        top.residual(out_bar, answer, self._change)
+        with together():
+            for change, b, start in zip(self._change, beta, self._start, strict=True):
+                algebra.dragged.launch(self.layout, self.device, [change, b], [start])
+        with together():
+            for start, f, to in zip(self._start, answer, f_bar, strict=True):
+                algebra.add_scaled.launch(self.layout, self.device, [start, f, self._one], [to])
+
+    @property
+    def adjoint_answer(self) -> Vector:
+        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        return self._answer
+
+    def measure(self) -> Residual:
+        """What the last solve left, relative to the change it made."""
+        if not self.how.iterations:
+            return Residual("none", 0, 0.0, 0.0)
+        return self.system.measure(self.how, self._change, self._answer, self._norm)

@@ -1,0 +1,321 @@
+"""What acts on the fluid in one step, on the device: its length, the forces' impulses, what sources pour."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import STEP_LIMIT
+from wfluid.fields.arrays import Vector, field, from_numpy, vector
+from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.state import State
+from wfluid.kernels.adjoint import forces as forces_adjoint
+from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.solve import algebra, sums
+from wfluid.kernels.step import forces
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import FORCE_LIMIT, BlobForce, FieldForce, Force
+from wfluid.model.gaussian_forces import STEP_GROWTH, Growth
+from wfluid.model.painted import Painted
+from wfluid.model.uniform_forces import Buoyancy
+from wfluid.step.densities import Pouring
+from wfluid.step.gaussians import Growths, Pushes
+
+_STEP = 5
+"""Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
+
+
+class Impulses:
+    """The numbers of a step with forces of certain kinds, and how they move the fluid.
+
+    Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too.
+    """
+
+    def __init__(
+        self, forces: Sequence[Force], fluid: Fluid, grid: Grid, device: wp.Device, gradients: bool = False
+    ):
+        self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
+        self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
+        walls, make = fluid.walls, (grid, fluid.walls, device, gradients)
+        pushes, growths = _by_weight(self._forces)
+        self._pushes = [Pushes(*group, *make) for group in pushes]
+        self._growths = [Growths(*group, *make) for group in growths]
+        self._fields: list[tuple[int, Vector]] = []
+        self._lifts: list[tuple[int, int]] = []
+        for n, force in enumerate(forces):
+            if isinstance(force, FieldForce):
+                self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
+            elif isinstance(force, Buoyancy):
+                self._lifts.append((n, _index_of(force.density, fluid.density_names)))
+        self._pourings = [Pouring(density, *make) for density in fluid.densities]
+        self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
+        self._lifted = field(self.layout, device) if self._lifts and gradients else None
+        self._rows = wp.zeros(2 * grid.ny, dtype=Real, device=device)
+        self._lay_out()
+
+    prescribed: float = 0.0
+    """Sum of the largest divergences that the last step's growths prescribe [1/s]."""
+    numbers: wp.array
+    """All numbers of a step, on the device."""
+    boxes: wp.array
+    """All boxes of a step, on the device."""
+    bars: wp.array
+    """What gradients are made of: impulses' and moments."""
+
+    def _lay_out(self) -> None:
+        """Allocate the arrays, and tell everything what parts of them are its own."""
+        self._groups = [*self._pushes, *self._growths]
+        blobs = [group.blobs for group in self._groups] + [p.blobs for p in self._pourings if p.blobs]
+        impulses = len(self._fields) + 2 * len(self._lifts)
+        painted = sum(pouring.painted for pouring in self._pourings)
+        begin = _STEP + impulses + painted
+        self.numbers, self.bars = (
+            wp.zeros(size, dtype=Real, device=self.device)
+            for size in (begin + sum(b.numbers for b in blobs), begin + sum(b.moments for b in blobs))
+        )
+        self.boxes = wp.zeros(sum(b.boxes for b in blobs), dtype=wp.int32, device=self.device)
+        step = _entries(self.numbers, slice(0, _STEP))
+        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = step
+        self._lone = slice(_STEP, _STEP + impulses)
+        self._impulses, self._impulses_bar = (_entries(a, self._lone) for a in (self.numbers, self.bars))
+        at = self._lone.stop
+        self._painted: list[slice] = []
+        for pouring in self._pourings:
+            self._painted.append(slice(at, at + pouring.painted))
+            if pouring.painted:
+                pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
+            at += pouring.painted
+        number, moment, box = at, at, 0
+        self._parts: dict[int, tuple[slice, slice]] = {}
+        for part in blobs:
+            numbers, moments = slice(number, number + part.numbers), slice(moment, moment + part.moments)
+            boxes = slice(box, box + part.boxes)
+            number, moment, box = numbers.stop, moments.stop, boxes.stop
+            taken = self.bars[moments] if part.moments else None
+            part.bind(self.numbers[numbers], self.boxes[boxes], taken)
+            self._parts[id(part)] = numbers, moments
+
+    @staticmethod
+    def key(forces: Sequence[Force]) -> tuple:
+        """What impulses are made for: forces of one key differ in numbers only."""
+        return tuple(
+            (isinstance(f, Growth), id(f.weight)) if isinstance(f, BlobForce) else (id(f),) for f in forces
+        )
+
+    @property
+    def pushes(self) -> bool:
+        """Whether anything adds to the velocity."""
+        return bool(self._pushes or self._fields or self._lifts)
+
+    @property
+    def swells(self) -> bool:
+        """Whether any force prescribes divergence."""
+        return bool(self._growths)
+
+    @property
+    def removed(self) -> float:
+        """Of the divergence prescribed, what had no place: its mean, taken off everywhere [1/s]."""
+        return float(sum(growths.mean.numpy()[0] for growths in self._growths))
+
+    def set(
+        self,
+        forces: Sequence[Force],
+        fluid: Fluid,
+        t: float,
+        dt: float,
+        until: float,
+        kept: float = 0.0,
+        live: bool = False,
+    ) -> None:
+        """Put a step on the device: what `row` finds."""
+        numbers, boxes = self.row(forces, fluid, t, dt, until, kept, live)
+        self.numbers.assign(numbers)
+        self.boxes.assign(boxes)
+
+    def row(
+        self,
+        forces: Sequence[Force],
+        fluid: Fluid,
+        t: float,
+        dt: float,
+        until: float,
+        kept: float = 0.0,
+        live: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers and boxes of a step of dt, in which forces and the fluid's sources act from t to `until`.
+
+        `kept` is the part of the last step's pressure that is taken for a first guess; none where
+        divergence is prescribed. With `live` forces count as acting even where their strengths are 0.
+
+        Raises:
+            ValueError: a force that would add more than the limit, with the force and the limit.
+        """
+        blobs = {n: force.over(t, until) for n, force in enumerate(forces) if isinstance(force, BlobForce)}
+        for blob in blobs.values():
+            if abs(blob.swell) * dt > STEP_GROWTH:
+                raise ValueError(
+                    f"the growth at {blob.center} would change areas by exp({blob.swell * dt:.3g}) in a step "
+                    f"of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer window help"
+                )
+            gained = max(blob.gained, abs(blob.swell) * blob.radius)
+            _check(f"the force at {blob.center}", gained, t, until)
+        self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
+        kept = 0.0 if self.prescribed else kept
+        hx, hy = self.grid.hx, self.grid.hy
+        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
+        for n in dict.fromkeys(n for n, _ in self._fields):
+            integrals = forces[n].integrals(t, until)
+            _check("a force over the picture", forces[n].reach * math.hypot(*integrals), t, until)
+            numbers += integrals
+        for n, _ in self._lifts:
+            impulse = forces[n].envelope.integral(t, until)
+            _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
+            numbers += [impulse * component for component in forces[n].vector]
+        pourings = list(zip(self._pourings, fluid.densities, strict=True))
+        for pouring, density in pourings:
+            numbers += pouring.impulses(density, t, until)
+        rows = []
+        for group in self._groups:
+            alive = [live and forces[n].envelope.acts(t, until) for n in group.members]
+            rows.append(group.blobs.row([blobs[n] for n in group.members], alive))
+        rows += [pouring.row(density, t, until, live) for pouring, density in pourings if pouring.blobs]
+        boxes = [np.empty(0, dtype=np.int32), *(boxes for _, boxes in rows)]
+        return np.concatenate([numbers, *(row for row, _ in rows)]), np.concatenate(boxes)
+
+    def push(self, state: State, out: Vector) -> None:
+        """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
+        for f, to in zip((state.u, state.v), out, strict=True):
+            algebra.copied.launch(self.layout, self.device, [f], [to])
+        impulses = iter(self._impulses)
+        for (_, fields), impulse in zip(self._fields, impulses, strict=False):
+            for f, component in zip(fields, out, strict=True):
+                forces.push_field.launch(self.layout, self.device, [f, impulse], [component])
+        for density, component, before, impulse in self._lifting(out):
+            inputs = [state.rho[density], impulse, before]
+            forces.lift.launch(self.layout, self.device, inputs, [component])
+        for pushes in self._pushes:
+            pushes.add(out)
+
+    def _lifting(self, velocity: Vector) -> list[tuple[int, wp.array, int, wp.array]]:
+        """For each buoyancy and component: the density, the component, its stride and its impulse."""
+        lifting = []
+        for n, (_, density) in enumerate(self._lifts):
+            impulses = self._impulses[len(self._fields) + 2 * n :][:2]
+            for component, before, impulse in zip(velocity, (1, self.layout.pitch), impulses, strict=True):
+                lifting.append((density, component, before, impulse))
+        return lifting
+
+    def prescribe(self, b: wp.array) -> None:
+        """Add the divergence that is to stay to b = -div v, in place: launches only."""
+        for growths in self._growths:
+            growths.add(b)
+
+    def pour(self, density: int, rho: wp.array) -> None:
+        """Add what its sources pour to a density, in place: launches only."""
+        self._pourings[density].add(rho)
+
+    def push_adjoint(self, velocity_bar: Vector, state: State, rho_bar: Sequence[wp.array]) -> None:
+        """The transpose of `push` with respect to impulses and densities: launches only.
+
+        `velocity_bar` comes with zeros for ghosts; what densities lifted is added to `rho_bar`.
+        """
+        bars = iter(self._impulses_bar)
+        for _, fields in self._fields:
+            self._multiply(velocity_bar, fields, next(bars))
+        for density, f_bar, before, impulse in self._lifting(velocity_bar):
+            inputs = [state.rho[density], before]
+            forces_adjoint.mean_with_before.launch(self.layout, self.device, inputs, [self._lifted])
+            self._multiply([f_bar], [self._lifted], next(bars))
+            algebra.copied.launch(self.layout, self.device, [f_bar], [self._lifted])
+            self._velocity_ghosts[before > 1].fill(self._lifted)
+            inputs = [self._lifted, impulse, before, self.layout.nx]
+            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho_bar[density]])
+        for pushes in self._pushes:
+            pushes.adjoint(velocity_bar)
+
+    def _multiply(self, x: Sequence[wp.array], y: Sequence[wp.array], out: wp.array) -> None:
+        """The sum of x y over all points."""
+        nx, ny = self.layout.nx, self.layout.ny
+        for n, (f, g) in enumerate(zip(x, y, strict=True)):
+            inputs = [f, g, nx, self.layout.pitch, n * ny]
+            sums.row_products.launch(ny, self.device, inputs, [self._rows])
+        sums.mean_of.launch(1, self.device, [self._rows, len(x) * ny, 1], [out])
+
+    def prescribe_adjoint(self, minus_b_bar: wp.array) -> None:
+        """The transpose of `prescribe`, from minus the gradient: launches only."""
+        for growths in self._growths:
+            growths.adjoint(minus_b_bar)
+
+    def pour_adjoint(self, density: int, rho_bar: wp.array) -> None:
+        """The transpose of `pour` with respect to the sources: launches only."""
+        self._pourings[density].adjoint(rho_bar)
+
+    def gradients(self, numbers: np.ndarray, bars: np.ndarray) -> dict[int, np.ndarray]:
+        """The gradients with respect to what each force does, from rows of `numbers` and `bars`, one a step.
+
+        By the force's number, (steps, n): of a Gaussian the numbers that `blobs.blob_of` knows, of a field
+        its integrals, of a buoyancy its two impulses.
+        """
+        found: dict[int, np.ndarray] = {}
+        for group in self._groups:
+            own, moments = self._parts[id(group.blobs)]
+            table = group.gradient(numbers[:, own], bars[:, moments])
+            found.update((n, table[:, :, place].T) for place, n in enumerate(group.members))
+        members = [n for n, _ in self._fields] + [n for n, _ in self._lifts for _ in range(2)]
+        for n in dict.fromkeys(members):
+            columns = [place for place, member in enumerate(members) if member == n]
+            found[n] = bars[:, self._lone][:, columns].astype(np.float64)
+        return found
+
+    def source_gradients(self, numbers: np.ndarray, bars: np.ndarray) -> list[dict[int, np.ndarray]]:
+        """The same for the sources of each density."""
+        found = []
+        for pouring, painted in zip(self._pourings, self._painted, strict=True):
+            own, moments = self._parts[id(pouring.blobs)] if pouring.blobs else (slice(0), slice(0))
+            found.append(pouring.gradients(numbers[:, own], bars[:, moments], bars[:, painted]))
+        return found
+
+
+_Groups = list[tuple[Painted | None, list[int]]]
+
+
+def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
+    """The weights of Gaussian pushes, and of growths, each with the numbers of its forces."""
+    found: tuple[dict, dict] = {}, {}
+    for n, force in enumerate(forces):
+        if isinstance(force, BlobForce):
+            groups = found[isinstance(force, Growth)]
+            groups.setdefault(id(force.weight), (force.weight, []))[1].append(n)
+    return list(found[0].values()), list(found[1].values())
+
+
+def _entries(array: wp.array, part: slice) -> list[wp.array]:
+    """Each number of a part of an array, as an array."""
+    return [array[n : n + 1] for n in range(part.start, part.stop)]
+
+
+def _index_of(name: str, densities: Sequence[str]) -> int:
+    if name not in densities:
+        there = ", ".join(densities) or "none"
+        raise ValueError(f"buoyancy reads the density {name!r}: expected one of the fluid's ({there})")
+    return list(densities).index(name)
+
+
+def _check(what: str, gained: float, t: float, until: float) -> None:
+    if not gained <= FORCE_LIMIT * STEP_LIMIT:
+        raise ValueError(
+            f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
+            f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
+        )
+
+
+def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:
+    fields = vector(layout, device, 2)
+    for value, f in zip(values, fields, strict=True):
+        from_numpy(value, f, layout)
+    return fields

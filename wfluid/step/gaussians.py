@@ -1,0 +1,309 @@
+"""Gaussians on the device: profiles, boxes of cells, and the forces and growths made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.arrays import Vector, field, from_numpy, vector
+from wfluid.fields.ghosts import Ghosts
+from wfluid.kernels.adjoint import forces as forces_adjoint
+from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.cell.real import Indices, Real
+from wfluid.kernels.cell.strips import alone
+from wfluid.kernels.solve import algebra, sums
+from wfluid.kernels.step import forces, sources
+from wfluid.model.force import Blob
+from wfluid.model.painted import Painted
+
+_NUMBERS = 8
+"""Of a blob on the device: center (2), radius, push (2), turn, swell, amount."""
+
+_FIELDS = 2
+"""Fields that moments are taken of: a velocity has two."""
+
+
+def blob_of(row: Sequence[float]) -> Blob:
+    """The numbers of one Gaussian, or the gradients with respect to them, in words."""
+    center_x, center_y, radius, push_x, push_y, turn, swell, amount = map(float, row)
+    return Blob((center_x, center_y), radius, (push_x, push_y), turn, swell, amount)
+
+
+class Blobs:
+    """A number of Gaussians whose places, sizes and strengths change from step to step.
+
+    What they are in a step is a row of numbers and one of boxes, which `row` finds and `bind` says where on
+    the device to look for.
+    """
+
+    def __init__(self, count: int, grid: Grid, walls: Walls, device: wp.Device, gradients: bool = False):
+        self.count, self.device, self.layout = count, device, Layout(grid.nx, grid.ny)
+        self.numbers, self.boxes = _NUMBERS * count, 4 * count
+        self.moments = _FIELDS * forces_adjoint.MOMENTS * count if gradients else 0
+        self._x = _Axis(count, grid.nx, grid.hx, grid.width * walls.periodic[0], device)
+        self._y = _Axis(count, grid.ny, grid.hy, grid.height * walls.periodic[1], device)
+        if gradients:
+            self._sums = wp.zeros(forces_adjoint.ORDERS * count * grid.ny, dtype=Real, device=device)
+
+    numbers: int
+    """Entries of a row of numbers."""
+    boxes: int
+    """Entries of a row of boxes."""
+    moments: int
+    """Entries of a row of moments, which gradients are made of."""
+
+    def bind(self, numbers: wp.array, boxes: wp.array, moments: wp.array | None) -> None:
+        """Read and write from now on in these arrays; no moments where there are no gradients."""
+        count = self.count
+        self._center_x, self._center_y, self._radius, *self._strengths = (
+            numbers[n * count : (n + 1) * count] for n in range(_NUMBERS)
+        )
+        self._boxes: Indices = boxes
+        if moments is not None:
+            size = self.moments // _FIELDS
+            self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS)]
+
+    def row(self, blobs: Sequence[Blob], live: Sequence[bool] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers and the boxes of what they do in a step.
+
+        Those that are `live` act even where their strengths are 0, for the gradients with respect to these.
+        """
+        rows = [(*b.center, b.radius, *b.push, b.turn, b.swell, b.amount) for b in blobs]
+        table = np.array(rows).reshape(self.count, _NUMBERS).T
+        acting = np.any(table[3:], axis=0)
+        boxes = self._boxed(table, acting | np.array(live) if live else acting)
+        return np.ascontiguousarray(table).ravel(), boxes.ravel()
+
+    def _boxed(self, table: np.ndarray, acting: np.ndarray) -> np.ndarray:
+        """The box of each, (blobs, 4), empty where it does not act: cells with a face or centre in reach."""
+        boxes = np.zeros((self.count, 4), dtype=np.int32)
+        reach = float(forces.CUT) * table[2]
+        for n, (axis, center) in enumerate(zip((self._x, self._y), table, strict=False)):
+            low, high = 0, axis.points
+            if not axis.period:
+                low = np.clip(np.floor((center - reach) / axis.h) - 1, 0, axis.points)
+                high = np.clip(np.ceil((center + reach) / axis.h) + 1, 0, axis.points)
+            boxes[:, 2 * n], boxes[:, 2 * n + 1] = low, high
+        boxes[~acting] = 0
+        return boxes
+
+    def push(self, velocity: Vector) -> None:
+        """Add their pushes and turns to the velocity, in place: launches only."""
+        x, y = self._x, self._y
+        self._profile(faces=True)
+        self._profile()
+        profiles = [x.on_faces[1], x.at_centres[1], y.at_centres[1], y.on_faces[1]]
+        inputs = [
+            *self._strengths[:3],
+            *profiles,
+            x.at_centres[0],
+            y.at_centres[0],
+            x.layout.pitch,
+            y.layout.pitch,
+        ]
+        forces.push.launch(self.layout, self.device, inputs, velocity, boxes=self._boxes)
+
+    def swell(self, s: wp.array) -> None:
+        """Add the divergence they prescribe to a field, in place: launches only."""
+        (r_x, g_x), (r_y, g_y) = self._profile()
+        inputs = [self._strengths[3], g_x, g_y, r_x, r_y, self._x.layout.pitch, self._y.layout.pitch]
+        sources.swell.launch(self.layout, self.device, inputs, [s], boxes=self._boxes)
+
+    def pour(self, rho: wp.array) -> None:
+        """Add their amounts to a density, in place: launches only."""
+        (_, g_x), (_, g_y) = self._profile()
+        inputs = [self._strengths[4], g_x, g_y, self._x.layout.pitch, self._y.layout.pitch]
+        sources.pour.launch(self.layout, self.device, inputs, [rho], boxes=self._boxes)
+
+    def measure_push(self, velocity_bar: Vector) -> None:
+        """Take the moments of the gradient with respect to what `push` adds to: launches only."""
+        self._profile(faces=True)
+        self._profile()
+        x, y = self._x, self._y
+        self._measure(0, velocity_bar[0], x.on_faces, y.at_centres)
+        self._measure(1, velocity_bar[1], x.at_centres, y.on_faces)
+
+    def measure_centres(self, f_bar: wp.array) -> None:
+        """The same for `swell` and `pour`, which add to a field at centres: launches only."""
+        self._measure(0, f_bar, *self._profile())
+
+    def _measure(self, slot: int, f_bar: wp.array, x: Vector, y: Vector) -> None:
+        (r_x, g_x), (r_y, g_y) = x, y
+        ny, count, device = self.layout.ny, self.count, self.device
+        inputs = [f_bar, g_x, r_x, self._boxes, ny, self.layout.pitch, self._x.layout.pitch]
+        forces_adjoint.row_moments.launch(count * ny, device, inputs, [self._sums])
+        inputs = [self._sums, g_y, r_y, self._boxes, ny, self._y.layout.pitch]
+        forces_adjoint.moments.launch(count, device, inputs, [self._moments[slot]])
+
+    def push_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradients with respect to rows of numbers, from these and the moments `measure_push` took."""
+        table, (u, v) = self._tables(numbers, moments)
+        sigma, px, py, turn = table[2:6]
+        # the velocity gained is (px - turn r_y) g on x-faces and (py + turn r_x) g on y-faces
+        out = np.zeros_like(table)
+        out[0] = (px * u(1, 0) - turn * u(1, 1) + py * v(1, 0) + turn * (v(2, 0) - v(0, 0))) / sigma
+        out[1] = (px * u(0, 1) - turn * (u(0, 2) - u(0, 0)) + py * v(0, 1) + turn * v(1, 1)) / sigma
+        around = v(3, 0) + v(1, 2) - v(1, 0) - (u(2, 1) + u(0, 3) - u(0, 1))
+        out[2] = (px * u.square + py * v.square + turn * around) / sigma
+        out[3], out[4], out[5] = u(0, 0), v(0, 0), v(1, 0) - u(0, 1)
+        return out
+
+    def swell_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The same for `swell`, from what `measure_centres` took."""
+        table, (s, _) = self._tables(numbers, moments)
+        sigma, rate = table[2], table[6]
+        # the divergence is rate (1 - r^2 / 2) g
+        out = np.zeros_like(table)
+        out[0] = rate * (2 * s(1, 0) - (s(3, 0) + s(1, 2)) / 2) / sigma
+        out[1] = rate * (2 * s(0, 1) - (s(2, 1) + s(0, 3)) / 2) / sigma
+        out[2] = rate * (2 * s.square - (s(4, 0) + 2 * s(2, 2) + s(0, 4)) / 2) / sigma
+        out[6] = s(0, 0) - s.square / 2
+        return out
+
+    def pour_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The same for `pour`, from what `measure_centres` took."""
+        table, (s, _) = self._tables(numbers, moments)
+        sigma, amount = table[2], table[7]
+        out = np.zeros_like(table)
+        out[:3] = amount * s(1, 0) / sigma, amount * s(0, 1) / sigma, amount * s.square / sigma
+        out[7] = s(0, 0)
+        return out
+
+    def _tables(self, numbers: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, list[_Moments]]:
+        """Rows (steps, …) as numbers by kind (8, steps, blobs), and the moments of either field."""
+        table = numbers.reshape(len(numbers), _NUMBERS, self.count).swapaxes(0, 1).astype(np.float64)
+        fields = moments.reshape(len(moments), _FIELDS, self.count, -1).astype(np.float64)
+        return table, [_Moments(fields[:, n]) for n in range(_FIELDS)]
+
+    def _profile(self, faces: bool = False) -> tuple[Vector, Vector]:
+        """Compute, and return, distances and Gaussians of both axes, at faces or at centres."""
+        for axis, center in ((self._x, self._center_x), (self._y, self._center_y)):
+            start, out = (0.0, axis.on_faces) if faces else (0.5, axis.at_centres)
+            inputs = [center, self._radius, start, axis.h, axis.period]
+            forces.profile.launch(axis.layout, self.device, inputs, out)
+        return self._x.at_centres, self._y.at_centres
+
+
+class _Axis:
+    """Profiles along one axis: distances [radii] and Gaussians, at faces and at centres, blob by blob."""
+
+    def __init__(self, count: int, points: int, h: float, period: float, device: wp.Device):
+        self.points, self.h, self.period = points, h, period
+        self.layout = Layout(points, count)
+        self.on_faces, self.at_centres = (vector(self.layout, device, 2) for _ in range(2))
+
+
+class _Moments:
+    """M_ab of every Gaussian in every step (`kernels/adjoint/forces.py`), (steps, blobs)."""
+
+    def __init__(self, values: np.ndarray):
+        self._values, orders = values, range(forces_adjoint.ORDERS)
+        self._places = [(a, b) for a in orders for b in orders if a + b < len(orders)]
+
+    def __call__(self, a: int, b: int) -> np.ndarray:
+        """Of r_x^a r_y^b g."""
+        return self._values[..., self._places.index((a, b))]
+
+    @property
+    def square(self) -> np.ndarray:
+        """Of |r|^2 g."""
+        return self(2, 0) + self(0, 2)
+
+
+class _Gaussians:
+    """Forces `members`, counted among all, with one weight."""
+
+    def __init__(
+        self,
+        weight: Painted | None,
+        members: Sequence[int],
+        grid: Grid,
+        walls: Walls,
+        device: wp.Device,
+        gradients: bool,
+    ):
+        self.members, self.device, self.layout = members, device, Layout(grid.nx, grid.ny)
+        self.blobs = Blobs(len(members), grid, walls, device, gradients)
+        self._weights = None
+        if weight is not None:
+            self._weights = field(self.layout, device)
+            from_numpy(weight.on(grid), self._weights, self.layout)
+            Ghosts(self.layout, walls.centre_rules(), device).fill(self._weights)
+
+
+class Pushes(_Gaussians):
+    """Gaussian forces with one weight."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self._gained = vector(self.layout, self.device, 2) if self._weights is not None else ()
+
+    def add(self, velocity: Vector) -> None:
+        """Add what they gain to the velocity, in place: launches only."""
+        if not self._gained:
+            self.blobs.push(velocity)
+            return
+        gained = self._gained
+        alone(lambda: [f.zero_() for f in gained])
+        self.blobs.push(gained)
+        for f, component, before in zip(gained, velocity, (1, self.layout.pitch), strict=True):
+            inputs = [f, self._weights, before]
+            forces.push_weighted.launch(self.layout, self.device, inputs, [component])
+
+    def adjoint(self, velocity_bar: Vector) -> None:
+        """The transpose of `add`, down to the moments of the Gaussians: launches only."""
+        if self._gained:
+            for f_bar, gained, before in zip(velocity_bar, self._gained, (1, self.layout.pitch), strict=True):
+                inputs = [f_bar, self._weights, before]
+                forces_adjoint.weighted.launch(self.layout, self.device, inputs, [gained])
+        self.blobs.measure_push(self._gained or velocity_bar)
+
+    def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
+        return self.blobs.push_gradient(numbers, moments)
+
+
+class Growths(_Gaussians):
+    """Growths with one weight: their divergence is a field first, of which the mean is taken off."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self._swell = field(self.layout, self.device)
+        self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=self.device)
+        self._rows = wp.zeros(self.layout.ny, dtype=Real, device=self.device)
+        self.mean = wp.zeros(1, dtype=Real, device=self.device)
+
+    mean: wp.array
+    """What was taken off [1/s]."""
+
+    def add(self, b: wp.array) -> None:
+        """Add what they prescribe to b, in place: launches only."""
+        alone(self._swell.zero_)
+        self.blobs.swell(self._swell)
+        if self._weights is not None:
+            algebra.weigh.launch(self.layout, self.device, [self._weights], [self._swell])
+        self._add_balanced(self._swell, b)
+
+    def _add_balanced(self, s: wp.array, b: wp.array) -> None:
+        nx, ny = self.layout.nx, self.layout.ny
+        inputs = [s, self._ones, nx, self.layout.pitch, 0]
+        sums.row_products.launch(ny, self.device, inputs, [self._rows])
+        sums.mean_of.launch(1, self.device, [self._rows, ny, nx * ny], [self.mean])
+        sources.add_balanced.launch(self.layout, self.device, [s, self.mean], [b])
+
+    def adjoint(self, minus_b_bar: wp.array) -> None:
+        """The transpose of `add`, down to the moments of the Gaussians, all with minus: launches only."""
+        minus_s_bar = self._swell
+        alone(minus_s_bar.zero_)
+        self._add_balanced(minus_b_bar, minus_s_bar)
+        if self._weights is not None:
+            algebra.weigh.launch(self.layout, self.device, [self._weights], [minus_s_bar])
+        self.blobs.measure_centres(minus_s_bar)
+
+    def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
+        return -self.blobs.swell_gradient(numbers, moments)

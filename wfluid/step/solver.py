@@ -1,0 +1,229 @@
+"""Steps fluids: plans each step, captures it as a graph, replays it, and says what its solves left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import STEP_LIMIT
+from wfluid.fields.arrays import from_numpy
+from wfluid.fields.device import load_kernels
+from wfluid.fields.graph import Replay, exclusive
+from wfluid.fields.state import State
+from wfluid.kernels.cell.layout import Layout
+from wfluid.model.fluid import Fluid
+from wfluid.model.force import Force, Group, flat
+from wfluid.solve.system import Residual
+from wfluid.step.forcing import Impulses
+from wfluid.step.step import Stages
+
+REPLAYS_KEPT = 16
+"""Pairs of states whose steps are kept captured; the oldest goes first."""
+
+
+@dataclass(frozen=True)
+class SolveReport:
+    """What the last step's solves left."""
+
+    pressure: Residual
+    """Of the projection: the divergence left, as iterations and norms."""
+    diffusion: Residual
+    """Of the diffusion, relative to the change it made; of u alone where the components are apart."""
+    divergence: float
+    """Largest |div v| left, beside what is prescribed [1/s]."""
+    prescribed: float = 0.0
+    """Sum of the largest divergences that sources prescribed [1/s]."""
+    removed: float = 0.0
+    """The mean of what they prescribed, taken off everywhere: it has no place between walls [1/s]."""
+
+
+class Solver:
+    """Steps fluids of one grid and one kind on one device.
+
+    Building one loads the kernels. For each pair of states stepped between, the step is captured as
+    a graph and replayed from then on; the time, the step and the forces' numbers are read from device
+    memory. On a CPU with free cores two threads share the rows of every stage, with the same bits as one. A
+    solver is for one thread at a time; several may each have their own.
+    """
+
+    @exclusive
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+        self.grid, self.fluid, self.device = grid, fluid, device
+        self.compile_seconds = load_kernels(device)
+        self.layout = Layout(grid.nx, grid.ny)
+        self._stages = Stages(grid, fluid, device)
+        self._last_dt = 0.0
+        self._preparation: Replay | None = None
+        self._impulses: dict[tuple, Impulses] = {}
+        self._last_impulses: Impulses | None = None
+        self._replays: dict[tuple, tuple[Replay, State, State, Impulses]] = {}
+        self._pool = self._stages.helpers()
+
+    @exclusive
+    def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
+        """A new state: a still fluid under an untouched picture, with its densities as they begin.
+
+        `points` (n, 2) are places x, y of the picture [longer side] that are followed.
+
+        Raises:
+            ValueError: points that are not (n, 2) finite numbers within the picture.
+        """
+        points, extent = np.asarray(points, dtype=np.float64), (self.grid.width, self.grid.height)
+        if points.size and (
+            points.ndim != 2 or points.shape[1] != 2 or not np.all((points >= 0) & (points <= extent))
+        ):
+            raise ValueError("points: expected x, y within the picture for each")
+        state = State.at_rest(self.grid, self.device, len(self._stages.densities), len(points))
+        for density, rho in zip(self._stages.densities, state.rho, strict=True):
+            density.begin(rho)
+        if points.size:
+            state.p_x.assign(points[:, 0] / self.grid.hx)
+            state.p_y.assign(points[:, 1] / self.grid.hy)
+        return state
+
+    @exclusive
+    def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
+        """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        self._check(state)
+        for values, f, ghosts in zip((u, v), (state.u, state.v), self._stages.velocity_ghosts, strict=True):
+            from_numpy(values, f, self.layout)
+            ghosts.fill(f)
+        state.q.zero_()
+
+    @exclusive
+    def set_map(self, state: State, displacement: np.ndarray) -> None:
+        """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
+        self._check(state)
+        cells = displacement / (self.grid.hx, self.grid.hy)
+        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._stages.moved_ghosts, strict=True)):
+            from_numpy(cells[..., n], f, self.layout)
+            ghosts.fill(f)
+
+    def step(
+        self,
+        state_in: State,
+        state_out: State,
+        forces: Sequence[Force | Group],
+        t: float,
+        dt: float,
+        *,
+        until: float | None = None,
+    ) -> None:
+        """Advance `state_in` at time t by dt into `state_out`, another state.
+
+        Forces act from t to `until`: t + dt unless the very number is given at which the next step
+        begins, so that rounding lets no instant fall between two steps.
+
+        Raises:
+            ValueError: dt negative, not finite or above 10 s; the two states are one, or of another grid
+                or device; a force whose impulse is not finite or beyond the limit.
+        """
+        if not (math.isfinite(dt) and 0 <= dt <= STEP_LIMIT):
+            raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
+        if state_in is state_out:
+            raise ValueError("a step cannot write the state it reads")
+        self._check(state_in, state_out)
+        until = t + dt if until is None else until
+        self._replay_for(state_in, state_out, flat(forces), t, dt, until).launch()
+
+    @exclusive
+    def _replay_for(
+        self,
+        state_in: State,
+        state_out: State,
+        forces: Sequence[Force],
+        t: float,
+        dt: float,
+        until: float,
+    ) -> Replay:
+        """The step, captured at first, with its numbers put where it reads them."""
+        stages, impulses = self._stages, self._impulses_for(forces)
+        last = self._last_impulses
+        swelled = last is not None and last.prescribed > 0
+        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, swelled))
+        self._last_impulses, self._last_dt = impulses, dt
+        plan = stages.plan(until, dt, self._prepare)
+        key = (id(state_in), id(state_out), id(impulses), plan)
+        if key not in self._replays:
+            work = partial(stages.advance, state_in, state_out, impulses)
+            replay = Replay(self.device, work, self._pool)
+            self._replays[key] = (replay, state_in, state_out, impulses)
+            if len(self._replays) > REPLAYS_KEPT:
+                del self._replays[next(iter(self._replays))]
+        self._replays[key] = self._replays.pop(key)  # the newest last
+        return self._replays[key][0]
+
+    def _prepare(self) -> None:
+        """Bring what depends on the medium up to date."""
+        if self._preparation is None:
+            self._preparation = Replay(self.device, self._stages.follow_medium, self._pool)
+        self._preparation.launch()
+
+    @exclusive
+    def report(self) -> SolveReport:
+        """Measure what the last step's solves left: true residuals and the divergence."""
+        stages = self._stages
+        pressure, divergence = stages.projection.measure()
+        prescribed, removed = 0.0, 0.0
+        if self._last_impulses:
+            prescribed, removed = self._last_impulses.prescribed, self._last_impulses.removed
+        return SolveReport(pressure, stages.diffusion.measure(), divergence, prescribed, removed)
+
+    @exclusive
+    def carry(self, state_in: State, state_out: State, dt: float) -> None:
+        """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
+
+        The velocity of `state_out` is untouched.
+        """
+        self._check(state_in, state_out)
+        impulses = self._impulses_for(())
+        impulses.set((), self.fluid, 0.0, dt, dt)
+        self._stages.trace(state_in, impulses)
+        self._stages.carry_map(state_in, state_out)
+
+    @exclusive
+    def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
+        """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
+        self._check(state_in, state_out)
+        stages = self._ready(state_in, t + dt, dt)
+        for f, out in zip(stages.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
+            wp.copy(out, f)
+
+    @exclusive
+    def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
+        """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
+        self._check(state_in, state_out)
+        stages = self._ready(state_in, 0.0, dt)
+        stages.project((state_in.u, state_in.v), (state_out.u, state_out.v))
+
+    def _ready(self, state: State, t: float, dt: float) -> Stages:
+        """The stages, ready for one of them alone."""
+        self._stages.plan(t, dt, self._prepare)
+        if self.fluid.viscosity_moves:
+            self._stages.follow_medium(state)
+        return self._stages
+
+    def _check(self, *states: State) -> None:
+        """Refuse states whose arrays are not this solver's size, or not on its device."""
+        for state in states:
+            if state.grid != self.grid or state.u.device != self.device:
+                raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
+            if len(state.rho) != len(self._stages.densities) or len(state.p_x) != len(states[0].p_x):
+                raise ValueError(
+                    f"a state with {len(state.rho)} densities and {len(state.p_x)} points: expected "
+                    f"{len(self._stages.densities)} and {len(states[0].p_x)}"
+                )
+
+    def _impulses_for(self, forces: Sequence[Force]) -> Impulses:
+        key = Impulses.key(forces)
+        if key not in self._impulses:
+            if len(self._impulses) >= REPLAYS_KEPT:
+                del self._impulses[next(iter(self._impulses))]
+            self._impulses[key] = Impulses(forces, self.fluid, self.grid, self.device)
+        return self._impulses[key]

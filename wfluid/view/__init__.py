@@ -1,0 +1,1 @@
+"""The picture seen through a map."""

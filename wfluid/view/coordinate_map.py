@@ -1,0 +1,68 @@
+"""The map of one frame: for every place, where in the source picture its colour comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.ghosts import ghost_table
+from wfluid.fields.graph import exclusive
+from wfluid.fields.state import State
+from wfluid.kernels.cell.layout import HALO
+
+
+@dataclass(frozen=True)
+class CoordinateMap:
+    """A backward map (`source_of`) on the cells' centres of a grid."""
+
+    grid: Grid
+    """The grid it was computed on."""
+    walls: Walls
+    """The walls it was computed between: how it continues beyond the edges."""
+    displacement: np.ndarray
+    """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
+
+    @classmethod
+    @exclusive
+    def of_state(cls, state: State, walls: Walls) -> CoordinateMap:
+        """A copy of a state's map."""
+        return cls(state.grid, walls, np.stack(state.displacement, axis=2))
+
+    @property
+    def source_of(self) -> np.ndarray:
+        """Place in the source seen at each centre [longer side], (ny, nx, 2), x then y."""
+        grid = self.grid
+        x = (np.arange(grid.nx) + 0.5) * grid.hx
+        y = (np.arange(grid.ny) + 0.5) * grid.hy
+        return self.displacement + np.stack(np.meshgrid(x, y), axis=2)
+
+    def source_at(self, places: np.ndarray) -> np.ndarray:
+        """Place in the source seen at any places (n, 2) [longer side], (n, 2), x then y.
+
+        By Catmull-Rom interpolation of the displacement, as pictures are looked up.
+        """
+        grid, places = self.grid, np.asarray(places, dtype=np.float64)
+        spacing = np.array([grid.hx, grid.hy])
+        at = places / spacing - 0.5
+        first = np.floor(at).astype(int)
+        weights, near = _catmull_rom(at - first), HALO + np.arange(-1, 3)
+        found = places.copy()
+        for component, (rule_x, rule_y) in enumerate(
+            (self.walls.moved_x_rules(), self.walls.moved_y_rules())
+        ):
+            columns, signs_x = (a[first[:, :1] + near] for a in ghost_table(grid.nx, rule_x))
+            rows, signs_y = (a[first[:, 1:] + near] for a in ghost_table(grid.ny, rule_y))
+            values = self.displacement[rows[:, :, None], columns[:, None, :], component]
+            weights_x, weights_y = weights[:, 0] * signs_x, weights[:, 1] * signs_y
+            found[:, component] += np.einsum("nj,nji,ni->n", weights_y, values, weights_x)
+        return found
+
+
+def _catmull_rom(part: np.ndarray) -> np.ndarray:
+    """Weights of the four values around places between the second and the third, (…, 4)."""
+    t = part[..., None]
+    powers = np.concatenate([np.ones_like(t), t, t**2, t**3], axis=-1)
+    return powers @ (np.array([[0, 2, 0, 0], [-1, 0, 1, 0], [2, -5, 4, -1], [-1, 3, -3, 1]]) / 2)

@@ -1,0 +1,226 @@
+"""The picture seen through a map: host side of `kernels/view/lookup.py`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from wfluid.domain.grid import Grid
+from wfluid.domain.walls import Walls
+from wfluid.fields.arrays import Vector, field, vector
+from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.graph import LAUNCHES, Replay, exclusive
+from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
+from wfluid.kernels.cell.real import Real
+from wfluid.kernels.cell.strips import together
+from wfluid.kernels.view import lookup
+from wfluid.pictures.picture import Picture
+from wfluid.pictures.sampling import EDGES, check_look_up
+from wfluid.system.threads import free_cores, helpers
+
+_PROGRAMS = {
+    "nearest": lookup.look_up_nearest,
+    "bilinear": lookup.look_up_bilinear,
+    "cubic": lookup.look_up_cubic,
+    "lanczos": lookup.look_up_lanczos,
+}
+
+STRIPS = 8
+"""Most threads that share a look-up."""
+
+QUAD = 4
+"""Channels that are looked up at once."""
+
+
+class PictureOnDevice:
+    """A picture's channels in device memory, four at a time, ready to be looked up in.
+
+    With the transparent edge a picture without alpha gains one, so that what lies outside shows.
+    """
+
+    def __init__(self, picture: Picture, transparent: bool, device: wp.Device):
+        pixels = np.asarray(picture.pixels, dtype=np.float32)
+        self.alpha = picture.alpha
+        if transparent and self.alpha is None:
+            self.alpha = pixels.shape[2]
+            pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+        self.height, self.width, self.channels = pixels.shape
+        self.quads = [
+            wp.array(quad.reshape(-1, QUAD), dtype=lookup.Pixel, device=device) for quad in quads_of(pixels)
+        ]
+
+
+def quads_of(pixels: np.ndarray) -> list[np.ndarray]:
+    """Pixels (height, width, channels), four channels at a time; what the last lack is 0."""
+    padded = np.pad(pixels, ((0, 0), (0, 0), (0, -pixels.shape[2] % QUAD)))
+    firsts = range(0, padded.shape[2], QUAD)
+    return [np.ascontiguousarray(padded[..., first : first + QUAD]) for first in firsts]
+
+
+class LookUp:
+    """Renders a picture through displacements on a fluid's grid, at a size of its own.
+
+    `edge` holds for axes between walls; a periodic axis always wraps. On a CPU the rows are shared
+    between its cores. `stretch`, `place` and `read`, in this order, only launch, so that a graph of
+    another's may capture them.
+    """
+
+    @exclusive
+    def __init__(
+        self,
+        picture: Picture,
+        grid: Grid,
+        walls: Walls,
+        device: wp.Device,
+        *,
+        width: int | None = None,
+        height: int | None = None,
+        filter: str = "cubic",
+        edge: str = "clamp",
+    ):
+        check_look_up(filter, edge)
+        self.device, self.grid, self.walls = device, grid, walls
+        self.picture, self.filter = picture, filter
+        self.source = PictureOnDevice(picture, edge == "transparent", device)
+        self._program = _PROGRAMS[filter]
+        self.edges = [EDGES.index("wrap" if periodic else edge) for periodic in walls.periodic]
+        self.width, self.height = width or picture.width, height or picture.height
+        self.slopes = self.source.width / grid.nx, self.source.height / grid.ny
+        self.strip = Layout(grid.nx, self.height)
+        self.layout = Layout(self.width, self.height)
+        self._columns = _tables(*cubic_weights(grid.nx, self.width), -1, device)
+        self._rows = _tables(*cubic_weights(grid.ny, self.height), HALO, device)
+        rules = (walls.moved_x_rules(), walls.moved_y_rules())
+        self._ghosts = [Ghosts(self.strip, axis, device) for axis in rules]
+        self.stretched = vector(self.strip, device, 2)
+        self._still = field(Layout(grid.nx, grid.ny), device)
+        self.coordinates = vector(self.layout, device, 2)
+        self.shown = [
+            wp.zeros(self.layout.size, dtype=lookup.Pixel, device=device) for _ in self.source.quads
+        ]
+        self._replay: Replay | None = None
+
+    source: PictureOnDevice
+    """What is looked up in."""
+    edges: list[int]
+    """What lies beyond its edges along x and y, as `EDGES` numbers it."""
+    slopes: tuple[float, float]
+    """Pixels of the source along x and y that a cell is long."""
+    strip: Layout
+    """Of displacements in rows of pixels and columns of cells."""
+    layout: Layout
+    """Of the pixels that are shown."""
+    stretched: Vector
+    """Displacements in rows of pixels and columns of cells, with ghosts: what `stretch` finds."""
+    coordinates: Vector
+    """Where each pixel's colour comes from, along x and y [px of the source]: what `place` finds."""
+    shown: list[wp.array]
+    """The pixels that `read` finds, four channels each."""
+
+    def stretch(self, d_x: wp.array, d_y: wp.array) -> None:
+        """Interpolate displacements [cells], fields with ghosts, to rows of pixels; launches only."""
+        pitch = self.strip.pitch  # columns are the grid's
+        with together():
+            for d, out in zip((d_x, d_y), self.stretched, strict=True):
+                lookup.stretch_y.launch(self.strip, self.device, [d, *self._rows, pitch], [out])
+        with together():
+            for out, ghosts in zip(self.stretched, self._ghosts, strict=True):
+                ghosts.fill(out)
+
+    def place(self) -> None:
+        """Find where each pixel's colour comes from; launches only."""
+        sizes = ((self.source.width, self.width), (self.source.height, self.height))
+        with together():
+            for axis, (pixels, outputs) in enumerate(sizes):
+                step = pixels / outputs
+                place = [step / 2 - 0.5, step * (axis == 0), step * (axis == 1), self.slopes[axis]]
+                inputs = [self.stretched[axis], *self._columns, self.strip.pitch, *place]
+                lookup.stretch_x.launch(self.layout, self.device, inputs, [self.coordinates[axis]])
+
+    def read(self) -> None:
+        """Read every pixel at its place; launches only."""
+        source = self.source
+        with together():
+            for quad, out in zip(source.quads, self.shown, strict=True):
+                inputs = [quad, *self.coordinates, source.width, source.height, *self.edges]
+                self._program.launch(self.layout, self.device, inputs, [out])
+
+    def launch(self, d_x: wp.array, d_y: wp.array) -> None:
+        """Compute the coordinates and pixels of `render`, left in device memory."""
+        with LAUNCHES:
+            self.stretch(d_x, d_y)
+            if self._replay is None:
+                threads = 1 if self.device.is_cuda else min(free_cores(), STRIPS)
+                self._replay = Replay(self.device, self._look_up, helpers(threads))
+        self._replay.launch()
+
+    def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
+        """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
+        self.launch(d_x, d_y)
+        quads = [self._to_numpy(out) for out in self.shown]
+        pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
+        pixels = np.array(pixels[..., : self.source.channels], dtype=np.float32, order="C")  # a copy
+        return replace(self.picture, pixels=pixels, alpha=self.source.alpha)
+
+    @property
+    def untouched(self) -> Picture:
+        """What a still map shows, to the bit; with the transparent edge it has its alpha."""
+        pixels, alpha = self.picture.pixels, self.picture.alpha
+        if (self.width, self.height) != (self.picture.width, self.picture.height):
+            still = self._still
+            return self.render(still, still)
+        if alpha != self.source.alpha:
+            pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
+        return replace(self.picture, pixels=np.array(pixels), alpha=self.source.alpha)
+
+    def source_of(self, d_x: wp.array, d_y: wp.array) -> np.ndarray:
+        """Where each pixel's colour comes from: (height, width, 2), x and y [px of the source].
+
+        Counted from the centre of the source's first pixel.
+        """
+        self.launch(d_x, d_y)
+        layout = self.layout
+        grids = [
+            f.numpy()[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch)
+            for f in self.coordinates
+        ]
+        cut = slice(HALO, HALO + self.height), slice(HALO, HALO + self.width)
+        return np.stack([grid[cut] for grid in grids], axis=2)
+
+    def _to_numpy(self, out: wp.array) -> np.ndarray:
+        layout = self.layout
+        rows = layout.size // layout.pitch
+        grid = out.numpy()[: rows * layout.pitch].reshape(rows, layout.pitch, QUAD)
+        return grid[HALO : HALO + self.height, HALO : HALO + self.width]
+
+    def _look_up(self) -> None:
+        self.place()
+        self.read()
+
+
+def cubic_weights(cells: int, pixels: int) -> tuple[np.ndarray, np.ndarray]:
+    """Catmull-Rom interpolation from `cells` centres to `pixels` centres of one axis, padded to whole spans.
+
+    The centre before each pixel, -1 … cells - 1, and the weights (4, …) of four centres, it being the second.
+    """
+    position = (np.arange(whole_spans(pixels)) + 0.5) * (cells / pixels) - 0.5
+    position = np.minimum(position, cells - 0.5)  # the padding of the last span reads inside
+    before = np.floor(position).astype(int)
+    t = position - before
+    return before, np.stack([_outer(t), _inner(t), _inner(1 - t), _outer(1 - t)])
+
+
+def _tables(before: np.ndarray, weights: np.ndarray, start: int, device: wp.Device) -> list[wp.array]:
+    """They on the device, centres counted from `start`."""
+    index = wp.array(before + start, dtype=wp.int32, device=device)
+    return [index, *(wp.array(weight, dtype=Real, device=device) for weight in weights)]
+
+
+def _outer(t: np.ndarray) -> np.ndarray:
+    return t * (-0.5 + t * (1.0 - 0.5 * t))
+
+
+def _inner(t: np.ndarray) -> np.ndarray:
+    return 1.0 + t * t * (-2.5 + 1.5 * t)
