@@ -101,7 +101,7 @@ def drawn(functional):
     width, height = picture.width, picture.height
     strong = np.quantile(np.abs(by), 0.995)
     grid = Grid(width, height, functional.grid.width, functional.grid.height)
-    holds, frees = (np.clip(paint.on(grid) / strong, 0, 1)[..., None] ** 0.7 for paint in shown)
+    holds, frees = (np.clip(paint.sample(grid) / strong, 0, 1)[..., None] ** 0.7 for paint in shown)
     pixels = 0.6 * picture.pixels[..., :3]
     pixels = pixels * (1 - holds) + holds * np.array([0.9, 0.06, 0.02])
     pixels = pixels * (1 - frees) + frees * np.array([0.02, 0.15, 0.9])

@@ -65,8 +65,8 @@ def check(frames_of_each):
     `frames_of_each` holds the frames of each animation. Returns the figures asserted.
     """
     grid = frames_of_each[0][0].map.grid
-    stiff = Painted(read_picture(STIFF)).on(grid) > 0.95
-    paint = Painted(read_picture(STILL)).on(grid)
+    stiff = Painted(read_picture(STIFF)).sample(grid) > 0.95
+    paint = Painted(read_picture(STILL)).sample(grid)
     still, around = paint > 0.95, (paint < 0.01) & _near(paint > 0.01, round(0.04 * grid.nx))
     strain = [
         np.mean([green_strain(frame)[stiff].mean() for frame in frames[1:]]) for frames in frames_of_each

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from wfluid import Morph, Timeline, match_keyframes, read_scene
-from wfluid.morphing.settings import Course
+from wfluid.morphing.settings import MorphSettings
 from wfluid.staging.build import stage_all
 
 pytestmark = pytest.mark.beside
@@ -103,7 +103,7 @@ def test_the_morphs_check_holds(device):
     example, scene = load("morph"), stage_all(read_scene(SCENES / "morph.toml"), device.alias)
     aims = scene.aims
     match = match_keyframes(scene.animation, aims.keyframes, start=aims.found, tolerance=aims.tolerance)
-    made = Morph(match, scene.pair, Course(Timeline(0.5, 24)))
+    made = Morph(match, scene.pair, MorphSettings(Timeline(0.5, 24)))
     frames = list(made.frames())
     print(example.check(made, frames))
     with pytest.raises(AssertionError):

@@ -10,8 +10,8 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce, VortexForce
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture, write_picture
-from wfluid.staging.images import Paintings
-from wfluid.view.densities import show_densities, stretched
+from wfluid.staging.images import SceneImages
+from wfluid.view.densities import composite_densities, upsample
 
 
 def picture(height=48, width=64, channels=3, seed=0, **settings):
@@ -80,7 +80,7 @@ def test_a_data_layer_keeps_its_numbers(tmp_path):
     codes = (np.arange(64 * 48).reshape(48, 64, 1) % 256 / 255).astype(np.float32)
     write_picture(matte, Picture(codes, None, "uint8", None, data=True))
     write_picture(colours, picture())
-    paintings = Paintings(read_picture(colours), tmp_path)
+    paintings = SceneImages(read_picture(colours), tmp_path)
     layer = paintings.layer("matte.png", None)
     assert layer.data
     np.testing.assert_allclose(layer.pixels, codes, atol=1e-6)
@@ -93,9 +93,9 @@ def test_ink_lets_through_a_power_of_its_colour():
     """Beer and Lambert: rho layers of ink of density one, in linear light."""
     source = picture()
     rho = np.full((12, 16), 2.0)
-    shown = show_densities(source, [Density(color=(0.5, 0.25, 1.0))], [rho])
+    shown = composite_densities(source, [Density(color=(0.5, 0.25, 1.0))], [rho])
     np.testing.assert_allclose(shown.pixels, source.pixels * (0.25, 0.0625, 1.0), rtol=1e-5)
-    assert show_densities(source, [Density()], [0 * rho]).pixels is source.pixels
+    assert composite_densities(source, [Density()], [0 * rho]).pixels is source.pixels
 
 
 def test_smoke_covers_and_is_seen_where_the_picture_is_not():
@@ -103,7 +103,7 @@ def test_smoke_covers_and_is_seen_where_the_picture_is_not():
     pixels = np.zeros((8, 8, 4), dtype=np.float32)
     pixels[:4] = (0.2, 0.4, 0.6, 1.0)
     density = Density(color=(1.0, 0.5, 0.0), look="smoke")
-    shown = show_densities(Picture(pixels, 3, "uint8", None), [density], [np.full((4, 4), 0.7)]).pixels
+    shown = composite_densities(Picture(pixels, 3, "uint8", None), [density], [np.full((4, 4), 0.7)]).pixels
     cover = 1 - np.exp(-0.7)
     np.testing.assert_allclose(
         shown[0, 0], (0.2 + 0.8 * cover, 0.4 + 0.1 * cover, 0.6 - 0.6 * cover, 1), atol=1e-6
@@ -114,15 +114,15 @@ def test_smoke_covers_and_is_seen_where_the_picture_is_not():
 @pytest.mark.parametrize("periodic", [(False, False), (True, True)])
 def test_stretching_keeps_constants_lines_and_the_range(periodic):
     """A cubic B-spline gives lines back inside, and never leaves the range of its values."""
-    assert np.allclose(stretched(np.full((5, 7), 3.0), 40, 31, periodic), 3.0)
+    assert np.allclose(upsample(np.full((5, 7), 3.0), 40, 31, periodic), 3.0)
     line = np.broadcast_to(np.arange(16.0), (12, 16))
-    across = stretched(line, 64, 48, periodic)[24]
+    across = upsample(line, 64, 48, periodic)[24]
     np.testing.assert_allclose(across[12:52], ((np.arange(64) + 0.5) / 4 - 0.5)[12:52], atol=1e-5)
     values = np.random.default_rng(0).random((9, 11))
-    assert values.min() <= stretched(values, 50, 70, periodic).min()
+    assert values.min() <= upsample(values, 50, 70, periodic).min()
     wave = np.sin(2 * np.pi * (np.arange(16) + 0.5) / 16)
     if periodic[0]:
-        wide = stretched(np.broadcast_to(wave, (4, 16)), 160, 4, periodic)[0]
+        wide = upsample(np.broadcast_to(wave, (4, 16)), 160, 4, periodic)[0]
         assert abs((wide[0] - wide[-1]) - (wide[1] - wide[0])) < 0.01
 
 

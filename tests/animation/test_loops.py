@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wfluid.animation.animation import Animation
-from wfluid.animation.loops import blows, fitted_period, frames_of, looped
+from wfluid.animation.loops import fit_to_loop, fitted_period, frames_of, starting_impulses
 from wfluid.domain.envelopes import Constant, Fade, Oscillator
 from wfluid.domain.timeline import Timeline
 from wfluid.model.densities import Density, Source
@@ -41,25 +41,26 @@ def test_periods_are_fitted_to_the_loop():
     force = GaussianForce(
         (0.5, 0.5), (1, 0), 0.1, Oscillator(period=0.52, phase=0.2, start=0.1) * Fade(rise=0.3)
     )
-    swing, fade = looped(force, 1.0).envelope.factors
+    swing, fade = fit_to_loop(force, 1.0).envelope.factors
     assert (swing.period, swing.start, swing.centred) == (0.5, 0.0, False) and fade == Fade(rise=0.3)
     whole = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
     assert swing.value(0.3) == pytest.approx(whole.value(0.3))
-    assert looped(NoiseForce(strength=1.0, period=0.9), 2.0).period == 1.0
+    assert fit_to_loop(NoiseForce(strength=1.0, period=0.9), 2.0).period == 1.0
 
 
 def test_blows_make_velocities_swing_about_zero():
     """A free particle under blow and force has no mean velocity over the loop, whatever the phase."""
     for phase in (0.0, 0.1, 0.5, 0.8):
         swing = Oscillator(period=0.5, phase=phase, centred=False)
-        (blow,) = blows([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, swing)], 1.0, 400)
+        (blow,) = starting_impulses([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, swing)], 1.0, 400)
         t = np.linspace(0, 1, 4001)[:-1]
         velocity = blow.envelope.integral(0, 1) + np.array([swing.integral(0, s) for s in t])
         assert abs(velocity.mean()) < 1e-3 * np.abs(velocity).max(), phase
-    assert blows([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, Constant())], 1.0, 10) == []
+    assert starting_impulses([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, Constant())], 1.0, 10) == []
     cosine = Oscillator(period=0.5, phase=0.25, centred=False)
     assert all(
-        abs(b.envelope.gain) < 1e-12 for b in blows([VortexForce((0.5, 0.5), 1.0, 0.1, cosine)], 1.0, 100)
+        abs(b.envelope.gain) < 1e-12
+        for b in starting_impulses([VortexForce((0.5, 0.5), 1.0, 0.1, cosine)], 1.0, 100)
     )
 
 

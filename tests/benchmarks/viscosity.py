@@ -17,7 +17,7 @@ from wfluid.fields.device import open_device
 from wfluid.fields.sums import norm
 from wfluid.model.fluid import Fluid
 from wfluid.model.painted import Freeze
-from wfluid.solve.system import Solve
+from wfluid.solve.system import SolveMethod
 from wfluid.step.solver import Solver
 
 DT = 1 / 24
@@ -64,7 +64,7 @@ def errors(diffusion, velocity):
     system, how = diffusion.system, diffusion.how
     diffusion.diffuse(velocity)
     exact, left, back = (vector(diffusion.layout, diffusion.device, 2) for _ in range(3))
-    best = Solve("conjugate gradients", 60, 1e-6)
+    best = SolveMethod("conjugate gradients", 60, 1e-6)
     system.prepare(best)
     system.solve(best, diffusion._change, exact)
     for f, g, out in zip(exact, diffusion._answer, left, strict=True):

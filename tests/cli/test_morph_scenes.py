@@ -62,7 +62,7 @@ def place_of(morph):
 
 
 def curve(name):
-    return lambda morph: getattr(morph.course, name).at(np.array([0.25, 0.5]))
+    return lambda morph: getattr(morph.settings, name).at(np.array([0.25, 0.5]))
 
 
 KEYED = [[0.5, 0.2], [1.0, 0.9]]
@@ -77,11 +77,11 @@ CASES = {
     ),
     "warp_curve": ({"warp_curve": KEYED}, curve("warp_curve"), (0.2, 0.9)),
     "blend_curve": ({"blend_curve": "linear"}, curve("blend_curve"), (0.25, 0.5)),
-    "blend": ({"blend": "display"}, lambda m: m.course.blend == "display", True),
-    "timing": ({"timing": "left.png"}, lambda m: m.course.mask.values[20, [10, 50]], (1, 0)),
-    "delay": ({"timing": "left.png", "delay": 0.25}, lambda m: m.course.delay, 0.25),
-    "reverse": ({"reverse": True}, lambda m: m.course.order[:2], (10, 9)),
-    "pingpong": ({"pingpong": True}, lambda m: len(m.course.order), 20),
+    "blend": ({"blend": "display"}, lambda m: m.settings.blend == "display", True),
+    "timing": ({"timing": "left.png"}, lambda m: m.settings.mask.values[20, [10, 50]], (1, 0)),
+    "delay": ({"timing": "left.png", "delay": 0.25}, lambda m: m.settings.delay, 0.25),
+    "reverse": ({"reverse": True}, lambda m: m.settings.order[:2], (10, 9)),
+    "pingpong": ({"pingpong": True}, lambda m: len(m.settings.order), 20),
 }
 """By key: the values, what is looked at, what is seen."""
 
@@ -97,14 +97,14 @@ def test_a_key_does_what_it_says(folder, key):
     np.testing.assert_allclose(look(staged(folder, values)), seen, rtol=1e-6)
     without = {name: value for name, value in values.items() if name != key}
     if key == "timing":
-        assert staged(folder, without).course.mask is None
+        assert staged(folder, without).settings.mask is None
     else:
         assert not np.array_equal(look(staged(folder, without)), seen)
 
 
 def test_what_is_left_out_is_the_documented_default(folder):
     found = staged(folder, {"timing": "left.png"})
-    course, parts = found.course, np.linspace(0, 1, 9)
+    course, parts = found.settings, np.linspace(0, 1, 9)
     for its in (course.warp_curve, course.blend_curve):
         np.testing.assert_allclose(its.at(parts), 3 * parts**2 - 2 * parts**3)
     assert (course.blend, course.delay, course.reverse, course.pingpong) == ("linear", 0.5, False, False)

@@ -4,7 +4,7 @@ import pytest
 from scenes import write_pictures
 
 from wfluid.cli.main import main
-from wfluid.cli.options import scene_of
+from wfluid.cli.options import scene_of_options
 from wfluid.cli.parser import build_parser
 from wfluid.scene.format import FORCES
 from wfluid.scene.short_forms import parse_density, parse_force
@@ -236,7 +236,7 @@ def flags_of(verb):
 
 def tables_of(*options):
     """What a command line says."""
-    return scene_of(build_parser().parse_args(["animate", "p.png", *options])).tables
+    return scene_of_options(build_parser().parse_args(["animate", "p.png", *options])).tables
 
 
 def test_every_flag_has_its_case():

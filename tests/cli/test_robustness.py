@@ -17,7 +17,7 @@ from wfluid.pictures import stills
 from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture, write_picture
-from wfluid.system.atomic import remove_leftovers, whole_file
+from wfluid.system.atomic import atomic_file, remove_leftovers
 
 PUSH = ("--push", "30,20:5,0:radius=8")
 QUICK = ("--cells", "16", "--duration", "0.2", "--fps", "10", "--quiet")
@@ -241,7 +241,7 @@ def test_a_stopped_run_leaves_whole_files_only(small, tmp_path, name, how):
 
 
 def test_leftovers_of_living_processes_stay(tmp_path):
-    with whole_file(tmp_path / "a.png") as temporary:
+    with atomic_file(tmp_path / "a.png") as temporary:
         temporary.write_bytes(b"x")
         remove_leftovers(tmp_path)
         assert temporary.exists()

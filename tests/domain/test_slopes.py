@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, Instantaneous, Oscillator, Product
 from wfluid.domain.paths import Path
 from wfluid.model.densities import PaintedSource, Source
-from wfluid.model.force import Blob
+from wfluid.model.force import GaussianImpulse
 from wfluid.model.gaussian_forces import GaussianForce, Growth, VortexForce
 from wfluid.model.image_force import ImageForce
 from wfluid.model.noise_force import NoiseForce
@@ -195,7 +195,7 @@ def numbers(blob):
 
 def random_blob(random):
     center, push = random.normal(size=(2, 2))
-    return Blob(tuple(center), random.normal(), tuple(push), *random.normal(size=3))
+    return GaussianImpulse(tuple(center), random.normal(), tuple(push), *random.normal(size=3))
 
 
 CENTERS = {
@@ -232,7 +232,7 @@ def test_a_gaussian_pulls_back_through_its_blob(kind, center, course, step):
     assert_slopes(
         force.pull_back(start, end, bar),
         [name, "radius", *center_names, *names],
-        lambda changed: numbers(bar) @ numbers(changed.over(start, end)),
+        lambda changed: numbers(bar) @ numbers(changed.impulse(start, end)),
         force,
     )
 
@@ -247,7 +247,7 @@ def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(course, step):
     assert_slopes(
         stroke.pull_back(start, end, bar),
         ["strength", "radius", *COURSES[course][1]],
-        lambda changed: numbers(bar) @ numbers(changed.over(start, end)),
+        lambda changed: numbers(bar) @ numbers(changed.impulse(start, end)),
         stroke,
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wfluid import Animation, Fluid, Timeline
-from wfluid.keyframes.keyframes import COINCIDENT, ParticleKeyframe, particles_of
+from wfluid.keyframes.keyframes import COINCIDENT, ParticleKeyframe, targets_of
 from wfluid.keyframes.match import match_keyframes
 from wfluid.pictures.picture import Picture
 
@@ -32,7 +32,7 @@ def refuses(message, build, *arguments, **more):
 
 
 def particles(*keyframes, pins=(), end=END, side=1.0):
-    return particles_of([ParticleKeyframe(*one) for one in keyframes], pins, EXTENT, end, side)
+    return targets_of([ParticleKeyframe(*one) for one in keyframes], pins, EXTENT, end, side)
 
 
 def test_keyframes_of_one_point_make_a_path_in_the_order_of_their_times():

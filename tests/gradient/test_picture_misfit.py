@@ -15,7 +15,7 @@ from wfluid.domain.timeline import Timeline
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import from_numpy, to_numpy
 from wfluid.fields.ghosts import Ghosts
-from wfluid.fields.graph import Replay
+from wfluid.fields.graph import CapturedGraph
 from wfluid.fields.state import State
 from wfluid.gradient.functional import Functional
 from wfluid.gradient.picture_misfit import PictureMisfit
@@ -24,7 +24,7 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture
-from wfluid.step.step import Stages
+from wfluid.step.step import Step
 from wfluid.system.threads import free_cores, helpers
 from wfluid.view.lookup import LookUp
 from wfluid.view.lookup_adjoint import LookUpAdjoint
@@ -62,8 +62,8 @@ def moved_state(device, grid, walls, size=0.06):
 def put(state, d_x, d_y, walls):
     """Give a state a displacement [cells], with ghosts."""
     for values, f, rules in (
-        (d_x, state.d_x, walls.moved_x_rules()),
-        (d_y, state.d_y, walls.moved_y_rules()),
+        (d_x, state.d_x, walls.displacement_x_rules()),
+        (d_y, state.d_y, walls.displacement_y_rules()),
     ):
         from_numpy(values, f, state.layout)
         Ghosts(state.layout, rules, f.device).fill(f)
@@ -110,7 +110,7 @@ def test_the_value_is_that_of_the_rendered_frame(device, name):
     animation = Animation(
         picture, fluid, [], Timeline(1), 24, target.width, target.height, **how, device=device.alias
     )
-    stages = Stages(animation.grid, fluid, device)
+    stages = Step(animation.grid, fluid, device)
     state = moved_state(device, animation.grid, fluid.walls)
     weight, factor = None, np.ones((target.height, target.width))
     if case["weight"]:
@@ -133,7 +133,7 @@ def test_the_value_does_not_depend_on_the_size_of_the_frame(device):
     state, values = moved_state(device, grid, fluid.walls), []
     for width, height in ((40, 58), (80, 29), (240, 174)):
         objective = PictureMisfit(smooth(240, 174), smooth(width, height, phase=1.0), 1.0)
-        term = objective.term(Stages(grid, fluid, device), 1.0, slice(0, 0))
+        term = objective.term(Step(grid, fluid, device), 1.0, slice(0, 0))
         term.measure(state)
         values.append(term.value())
     assert values == pytest.approx([values[-1]] * 3, rel=0.01)
@@ -143,7 +143,7 @@ def test_the_gradient_is_added_to_cells_and_no_ghost(device):
     """What is there stays, in ghosts and beside the map too; two calls give twice of one."""
     grid, fluid = Grid.for_picture(WIDTH, HEIGHT, 24), Fluid()
     term = PictureMisfit(smooth(40, 29), smooth(31, 40, phase=1.0), 1.0).term(
-        Stages(grid, fluid, device), 1.0, slice(0, 0)
+        Step(grid, fluid, device), 1.0, slice(0, 0)
     )
     state, bar = moved_state(device, grid, fluid.walls), State.at_rest(grid, device)
     term.adjoint(state, bar)
@@ -351,7 +351,7 @@ def test_two_threads_compute_the_bits_of_one(device):
         pytest.skip("strips are for CPU threads")
     grid, fluid = Grid(96, 72, 1.0, 0.75), Fluid()
     objective = PictureMisfit(noise(120, 90, 5), noise(150, 100, 5, seed=1), 1.0)
-    term = objective.term(Stages(grid, fluid, device), 1.0, slice(0, 0))
+    term = objective.term(Step(grid, fluid, device), 1.0, slice(0, 0))
     state = moved_state(device, grid, fluid.walls)
     still, bar, elsewhere = (State.at_rest(grid, device) for _ in range(3))
 
@@ -372,8 +372,8 @@ def test_two_threads_compute_the_bits_of_one(device):
     one = found()
     assert all(np.any(a) for a in one)
     shared = helpers(2)
-    measure = Replay(device, lambda: term.measure(state), shared)
-    adjoint = Replay(device, lambda: term.adjoint(state, bar), shared)
+    measure = CapturedGraph(device, lambda: term.measure(state), shared)
+    adjoint = CapturedGraph(device, lambda: term.adjoint(state, bar), shared)
     for _ in range(10):
         put_aside()
         adjoint.launch()

@@ -28,12 +28,12 @@ from wfluid.fields.device import load_kernels
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
 from wfluid.model.densities import PaintedSource
-from wfluid.model.force import Blob
-from wfluid.solve.multigrid import Points
+from wfluid.model.force import GaussianImpulse
+from wfluid.solve.multigrid import Location
 from wfluid.step.diffusion import ScalarDiffusion
-from wfluid.step.forcing import Impulses
-from wfluid.step.gaussians import Blobs, blob_of
-from wfluid.step.step import Stages
+from wfluid.step.forcing import Forcing
+from wfluid.step.gaussians import GaussianBatch, gaussian_impulse_of
+from wfluid.step.step import Step
 
 pytestmark = pytest.mark.float64
 
@@ -182,7 +182,7 @@ def test_scatter_adds_what_numpy_adds(device, kind, size, places):
 
 def projecting(device, walls="free-slip", **fluid):
     """Stages, ready for a step of DT."""
-    stages = Stages(GRID, Fluid(walls=walls, **fluid), device)
+    stages = Step(GRID, Fluid(walls=walls, **fluid), device)
     stages.plan(DT, DT, stages.follow_medium)
     return stages
 
@@ -246,7 +246,7 @@ def test_taking_the_pressure_so_far_off_and_adding_it_again_is_transposed(device
     """v, q -> v - kept grad q, kept q: what a step does before its diffusion and after its projection."""
     stages = projecting(device, walls, viscosity=media(GRID)["smooth"][0])
     ghosts = stages.velocity_ghosts
-    impulses = Impulses((), stages.fluid, GRID, device)
+    impulses = Forcing((), stages.fluid, GRID, device)
     impulses.set((), stages.fluid, 0.0, DT, DT, kept=0.7)
     state = State.at_rest(GRID, device)
     (q,) = noise(LAYOUT, device, 1, 5, Ghosts(LAYOUT, stages.fluid.walls.centre_rules(), device))
@@ -278,10 +278,10 @@ def test_the_diffusion_of_one_field_is_transposed(device, name, points, walls):
     settings, dt_mu, method = SCALARS[name]
     fluid = Fluid(walls=walls, **settings)
     components = {
-        "u": Points(fluid.walls.u_rules(), (True, False)),
-        "v": Points(fluid.walls.v_rules(), (False, True)),
+        "u": Location(fluid.walls.u_rules(), (True, False)),
+        "v": Location(fluid.walls.v_rules(), (False, True)),
     }
-    where = components.get(points, Points(fluid.walls.centre_rules()))
+    where = components.get(points, Location(fluid.walls.centre_rules()))
     diffusion = ScalarDiffusion(GRID, fluid, where, device, conserved=points == "conserved")
     assert diffusion.plan(dt_mu).method == method
     ghosts = Ghosts(LAYOUT, where.rules, device)
@@ -344,7 +344,7 @@ ADVECTIONS = {
 @pytest.mark.parametrize("scheme", ADVECTIONS)
 def test_what_is_carried_from_fixed_feet_is_scattered_back(device, scheme, walls, largest):
     """Both components of the velocity, and of the displacement, whose foot is a summand beside."""
-    stages = Stages(GRID, Fluid(scheme=scheme, walls=walls), device)
+    stages = Step(GRID, Fluid(scheme=scheme, walls=walls), device)
     advect, carry, scattered = ADVECTIONS[scheme]
     foot, pitch = feet(stages, 3, largest), LAYOUT.pitch
     place = (wp.zeros(LAYOUT.size, dtype=wp.int32, device=device), *vector(LAYOUT, device, 2))
@@ -380,7 +380,7 @@ def test_a_densitys_transport_is_transposed(device, walls, limited):
     that of the linear map, with the rounding of values of about 20: 20 eps / small = 5e-12, at random 400
     times.
     """
-    stages = Stages(GRID, Fluid(walls=walls, densities=[Density()]), device)
+    stages = Step(GRID, Fluid(walls=walls, densities=[Density()]), device)
     ghosts, small = Ghosts(LAYOUT, stages.fluid.walls.centre_rules(), device), 2.0**-10
     rng = np.random.default_rng(7)
     j, i = np.mgrid[:18, :23]
@@ -413,8 +413,8 @@ def test_a_densitys_transport_is_transposed(device, walls, limited):
 @pytest.mark.parametrize("walls", WALLS)
 def test_means_of_faces_at_centres_are_transposed(device, walls):
     """The Euler trace of a velocity too slow to reach a wall, -dt v at centres, is linear."""
-    stages = Stages(GRID, Fluid(scheme="paper", walls=walls), device)
-    impulses = Impulses((), stages.fluid, GRID, device)
+    stages = Step(GRID, Fluid(scheme="paper", walls=walls), device)
+    impulses = Forcing((), stages.fluid, GRID, device)
     impulses.set((), stages.fluid, 0.0, DT, DT)
     x = noise(LAYOUT, device, 2, 1, *stages.velocity_ghosts)
     for f in x:
@@ -439,7 +439,7 @@ def test_means_of_faces_at_centres_are_transposed(device, walls):
 def acting(forces, device, walls, densities=()):
     """The forces' impulses over the first step, and the ghosts of a velocity."""
     fluid = Fluid(walls=walls, densities=densities)
-    impulses = Impulses(forces, fluid, GRID, device, gradients=True)
+    impulses = Forcing(forces, fluid, GRID, device, gradients=True)
     impulses.set(forces, fluid, 0.0, DT, DT)
     rules = fluid.walls.u_rules(), fluid.walls.v_rules()
     return impulses, [Ghosts(LAYOUT, own, device) for own in rules]
@@ -497,7 +497,7 @@ def test_pushes_twirls_and_winds_are_transposed_with_respect_to_their_strengths(
         if isinstance(force, Wind):
             right += np.dot(bars[n], force.integrals(0.0, DT))
         else:
-            bar, done = blob_of(bars[n]), force.over(0.0, DT)
+            bar, done = gaussian_impulse_of(bars[n]), force.impulse(0.0, DT)
             right += np.dot(bar.push, done.push) + bar.turn * done.turn
     left, size = inner(y, out, LAYOUT)
     assert abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
@@ -517,7 +517,9 @@ def test_growths_are_transposed_with_respect_to_their_rates(device, walls):
     impulses.prescribe(b)
     impulses.prescribe_adjoint(wp.array(-y.numpy(), dtype=Real, device=device))
     bars = one_step(impulses.gradients, impulses)
-    right = sum(blob_of(bars[n]).swell * force.over(0.0, DT).swell for n, force in enumerate(forces))
+    right = sum(
+        gaussian_impulse_of(bars[n]).swell * force.impulse(0.0, DT).swell for n, force in enumerate(forces)
+    )
     left, size = inner([y], [b], LAYOUT)
     assert abs(to_numpy(b, LAYOUT).sum()) < 1e-11 and size > 1
     assert abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
@@ -536,7 +538,7 @@ def test_sources_are_transposed_with_respect_to_what_they_pour(device, walls):
     impulses.pour(1, rho)
     impulses.pour_adjoint(1, y)
     (none, bars) = impulses.source_gradients(impulses.numbers.numpy()[None], impulses.bars.numpy()[None])
-    round_ones = [blob_of(bars[n][0]).amount for n in (0, 2)]
+    round_ones = [gaussian_impulse_of(bars[n][0]).amount for n in (0, 2)]
     right = DT * (2.0 * round_ones[0] - 3.0 * round_ones[1] + bars[1][0, 0])
     left, size = inner([y], [rho], LAYOUT)
     assert none == {} and abs(left) > 1e-3 * size and abs(left - right) <= TOLERANCE * size
@@ -548,8 +550,8 @@ about 10 / 0.13^5 = 3e5 of its strength at some 100 points, so their error, STEP
 about 1e-8; the rounding of the sum, eps 100 / STEP, 1e-10."""
 
 BLOBS = [
-    Blob((0.31, 0.42), 0.13, push=(1.5, -0.8), turn=0.7, swell=1.2, amount=0.9),
-    Blob((0.93, 0.05), 0.21, push=(-0.4, 1.1), turn=-1.3, swell=-0.7, amount=1.4),
+    GaussianImpulse((0.31, 0.42), 0.13, push=(1.5, -0.8), turn=0.7, swell=1.2, amount=0.9),
+    GaussianImpulse((0.93, 0.05), 0.21, push=(-0.4, 1.1), turn=-1.3, swell=-0.7, amount=1.4),
 ]
 
 
@@ -573,7 +575,7 @@ def number(bar, name):
 @pytest.mark.parametrize("kind", ["push", "swell", "pour"])
 def test_moments_hold_the_gradient_with_respect_to_every_number(device, kind, walls):
     """Of <y, what two Gaussians add>, one in a corner, against differences of fourth order."""
-    blobs = Blobs(2, GRID, Walls.parse(walls), device, gradients=True)
+    blobs = GaussianBatch(2, GRID, Walls.parse(walls), device, gradients=True)
     numbers, moments = (wp.zeros(n, dtype=Real, device=device) for n in (blobs.numbers, blobs.moments))
     boxes = wp.zeros(blobs.boxes, dtype=wp.int32, device=device)
     blobs.bind(numbers, boxes, moments)
@@ -592,7 +594,7 @@ def test_moments_hold_the_gradient_with_respect_to_every_number(device, kind, wa
     blobs.measure_push(y) if kind == "push" else blobs.measure_centres(*y)
     table = getattr(blobs, f"{kind}_gradient")(numbers.numpy()[None], moments.numpy()[None])
     for n in range(len(BLOBS)):
-        bar = blob_of(table[:, 0, n])
+        bar = gaussian_impulse_of(table[:, 0, n])
         for name in ("x", "y", "radius", *names):
 
             def moved(by, n=n, name=name):

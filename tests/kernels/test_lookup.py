@@ -8,7 +8,7 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import from_numpy
 from wfluid.fields.ghosts import Ghosts
-from wfluid.fields.graph import Replay
+from wfluid.fields.graph import CapturedGraph
 from wfluid.fields.state import State
 from wfluid.pictures.picture import Picture
 from wfluid.view.lookup import LookUp
@@ -30,8 +30,8 @@ def moved_state(device, walls, size=0.04):
     d_x = size * np.sin(2 * np.pi * x) * np.cos(3 * y) / grid.hx
     d_y = size * np.sin(np.pi * y / grid.height) * np.cos(5 * x) / grid.hy
     for values, f, rules in (
-        (d_x, state.d_x, walls.moved_x_rules()),
-        (d_y, state.d_y, walls.moved_y_rules()),
+        (d_x, state.d_x, walls.displacement_x_rules()),
+        (d_y, state.d_y, walls.displacement_y_rules()),
     ):
         from_numpy(values, f, state.layout)
         Ghosts(state.layout, rules, device).fill(f)
@@ -103,7 +103,7 @@ def test_edges_continue_the_picture(device, filter, edge, mode):
         f.fill_(pixels * cells)
     look_up = LookUp(image, grid, walls, device, filter=filter)
     look_up.edges[:] = LookUp(image, grid, Walls(), device, filter=filter, edge=edge).edges
-    look_up._replay = Replay(device, look_up._look_up, None)
+    look_up._replay = CapturedGraph(device, look_up._look_up, None)
     got = look_up.render(state.d_x, state.d_y).pixels
     padded = np.pad(image.pixels, ((100, 100), (100, 100), (0, 0)), mode=mode)
     expected = padded[100 + down : 100 + down + HEIGHT, 100 + right : 100 + right + WIDTH]

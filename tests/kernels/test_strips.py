@@ -26,7 +26,7 @@ from wfluid import (
     Source,
     VortexForce,
 )
-from wfluid.fields.graph import Replay
+from wfluid.fields.graph import CapturedGraph
 from wfluid.system.threads import helpers
 
 FORCE = GaussianForce((0.4, 0.5), (2.0, 1.0), 0.08)
@@ -171,7 +171,7 @@ def test_a_loop_in_a_graph_runs_as_often_on_every_strip(cpu):
         if STRIP.get().alone():
             wp.launch(count_down, dim=1, inputs=[passes, going], device=cpu)
 
-    replay = Replay(cpu, lambda: repeat_while(going, body), helpers(2))
+    replay = CapturedGraph(cpu, lambda: repeat_while(going, body), helpers(2))
     for _ in range(300):  # a strip that read the condition late would leave the other waiting
         going.assign([1])
         passes.zero_()

@@ -17,9 +17,9 @@ import wfluid.keyframes.match
 import wfluid.keyframes.search
 from wfluid import Freeze, Grid, Picture, Solver
 from wfluid.fields.device import open_device
-from wfluid.keyframes.keyframes import TOLERANCE, particles_of
+from wfluid.keyframes.keyframes import TOLERANCE, targets_of
 from wfluid.keyframes.match import REACHED, STOPPED, UNREACHABLE
-from wfluid.keyframes.ways import ways_of
+from wfluid.keyframes.ways import plan_ways
 
 pytestmark = pytest.mark.beside
 
@@ -92,8 +92,8 @@ def test_points_are_on_their_ways_all_the_time(match_of, name):
     """They set out at once and do not rush at the end: never far from where the plan has them."""
     match = match_of(name)
     timeline, grid = match.animation.timeline, match.animation.grid
-    particles = particles_of(CASES[name].keyframes, (), (grid.width, grid.height), timeline.end)
-    for n, way in enumerate(ways_of(particles, (grid.width, grid.height), 0)):
+    particles = targets_of(CASES[name].keyframes, (), (grid.width, grid.height), timeline.end)
+    for n, way in enumerate(plan_ways(particles, (grid.width, grid.height), 0)):
         times = np.array([timeline.time_of(step) for step in range(timeline.steps + 1)])
         aside = np.linalg.norm(match.tracks[:, n] - way.at(times), axis=1)
         assert aside.max() < 0.04 * way.length(0.0, timeline.end), aside.max()

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from wfluid import Timeline
-from wfluid.keyframes.keyframes import ParticleKeyframe, particles_of
+from wfluid.keyframes.keyframes import ParticleKeyframe, targets_of
 from wfluid.keyframes.search import Smoothness
-from wfluid.keyframes.way_misfit import HOLD, Journey
+from wfluid.keyframes.way_misfit import HOLD, WayMisfit
 from wfluid.keyframes.ways import (
     LEAST_STEPS,
     LEAST_WINDOWS,
     NARROWEST,
     WIDEST,
     Way,
-    edges_of,
     forces_along,
+    plan_ways,
     radii_of,
-    ways_of,
+    window_edges,
 )
 
 EXTENT = (1.0, 0.8)
@@ -29,7 +29,7 @@ TIMELINE = Timeline(1.0, fps=24, substeps=2)
 def particles(*paths, pins=()):
     """Of points with their destinations by time."""
     keyframes = [ParticleKeyframe(point, to, t) for point, stops in paths for t, to in stops.items()]
-    return particles_of(keyframes, pins, EXTENT, TIMELINE.end)
+    return targets_of(keyframes, pins, EXTENT, TIMELINE.end)
 
 
 PATH = ((0.3, 0.4), {0.25: (0.5, 0.3), 0.5: (0.6, 0.5), 1.0: (0.45, 0.45)})
@@ -80,7 +80,7 @@ def test_ways_keep_apart_that_would_meet_on_straight_lines(name, seed):
         for a, b in combinations(own, 2)
     )
     assert nearest([Way(one, 0.0) for one in own]) < 0.1 * ends
-    assert nearest(ways_of(own, EXTENT, seed)) > 0.5 * ends
+    assert nearest(plan_ways(own, EXTENT, seed)) > 0.5 * ends
 
 
 def nearest(ways):
@@ -93,7 +93,7 @@ def nearest(ways):
 def test_a_way_goes_round_a_pin():
     own = particles(((0.3, 0.4), {1.0: (0.6, 0.4)}), pins=[(0.45, 0.4)])
     assert nearest([Way(one, 0.0) for one in own]) < 0.001
-    ways = ways_of(own, EXTENT, 0)
+    ways = plan_ways(own, EXTENT, 0)
     assert nearest(ways) > 0.5 * 0.15
     np.testing.assert_array_equal(ways[1].at(np.linspace(0, 1, 5)), [(0.45, 0.4)] * 5)
 
@@ -104,7 +104,7 @@ def test_ways_bend_away_from_walls_whatever_the_seed(y, seed):
     """One arrow comes no nearer to the wall than it began; of a swap both stay in the picture."""
     arrow, swap = ((0.3, y), {1.0: (0.7, y)}), [((0.3, y), {1.0: (0.6, y)}), ((0.6, y), {1.0: (0.3, y)})]
     for paths in ([arrow], swap):
-        for way in ways_of(particles(*paths), EXTENT, seed):
+        for way in plan_ways(particles(*paths), EXTENT, seed):
             heights = way.at(np.linspace(0, 1, 201))[:, 1]
             room = np.minimum(heights, EXTENT[1] - heights)
             assert room.min() > (0.029 if len(paths) == 1 else 0.0)
@@ -113,12 +113,12 @@ def test_ways_bend_away_from_walls_whatever_the_seed(y, seed):
 def test_the_seed_chooses_the_side():
     """The same seed the same ways; over some seeds both sides, as mirror images."""
     own = particles(*SWAP)
-    found = {tuple(way.bend for way in ways_of(own, EXTENT, seed)) for seed in range(8)}
+    found = {tuple(way.bend for way in plan_ways(own, EXTENT, seed)) for seed in range(8)}
     assert len(found) == 2
     one, other = found
     np.testing.assert_array_equal(one, np.negative(other))
     for seed in range(8):
-        again = [[way.bend for way in ways_of(own, EXTENT, seed)] for _ in range(2)]
+        again = [[way.bend for way in plan_ways(own, EXTENT, seed)] for _ in range(2)]
         assert again[0] == again[1]
 
 
@@ -140,7 +140,7 @@ def test_windows_begin_at_nought_and_end_at_keyframes():
     own = particles(PATH, ((0.7, 0.6), {0.75: (0.8, 0.7)}))
     for radius in (0.01, 0.05, 0.12):
         ways = [Way(one, 0.1) for one in own]
-        edges = edges_of(ways, [radius] * 2, TIMELINE)
+        edges = window_edges(ways, [radius] * 2, TIMELINE)
         assert edges[0] == 0 and edges[-1] == 48
         assert {12, 24, 36} <= set(edges)
         lengths = np.diff(edges)
@@ -153,16 +153,16 @@ def test_windows_begin_at_nought_and_end_at_keyframes():
 
 def test_windows_end_with_the_last_keyframe():
     own = particles(((0.3, 0.4), {0.5: (0.5, 0.3)}))
-    edges = edges_of([Way(own[0], 0.1)], [0.12], TIMELINE)
+    edges = window_edges([Way(own[0], 0.1)], [0.12], TIMELINE)
     assert edges[0] == 0 and edges[-1] == 24 and len(edges) == LEAST_WINDOWS + 1
     one_step = particles(((0.3, 0.4), {1 / 48: (0.31, 0.4)}))
-    assert edges_of([Way(one_step[0], 0.1)], [0.006], TIMELINE) == [0, 1]
+    assert window_edges([Way(one_step[0], 0.1)], [0.006], TIMELINE) == [0, 1]
 
 
 def test_forces_stand_on_the_way_in_windows_that_share_its_time():
     """Each where the point is expected in the middle of its window, which ends where the next begins."""
     path, short = particles(PATH, ((0.7, 0.6), {0.5: (0.8, 0.7)}))
-    edges = edges_of([Way(path, 0.2), Way(short, 0.2)], [0.05, 0.05], TIMELINE)
+    edges = window_edges([Way(path, 0.2), Way(short, 0.2)], [0.05, 0.05], TIMELINE)
     for one, end in ((path, 1.0), (short, 0.5)):
         way = Way(one, 0.2)
         forces = list(forces_along(way, 0.05, edges, TIMELINE))
@@ -179,7 +179,9 @@ def test_forces_stand_on_the_way_in_windows_that_share_its_time():
 def journey_of(paths, moments, pins=(), **more):
     """Of ways without a bend."""
     own = particles(*paths, pins=pins)
-    return Journey([Way(one, 0.0) for one in own], np.array([one.point for one in own]), moments, 0.1, **more)
+    return WayMisfit(
+        [Way(one, 0.0) for one in own], np.array([one.point for one in own]), moments, 0.1, **more
+    )
 
 
 @pytest.mark.parametrize("led", [1.0, 0.0])
@@ -210,10 +212,10 @@ def test_a_journey_leads_only_the_points_it_is_told_to():
     assert journey.at(1.0, np.zeros((2, 2)))[1].all()
 
 
-def test_a_journey_aims_beside_places_that_are_shifted_or_lured_from():
+def test_the_misfit_aims_beside_places_by_corrections_and_multipliers():
     """A shift moves the place itself; a lure only what is aimed at, so that the misfit remains one."""
     by = {1.0: np.array([[0.02, -0.02]])}
-    for kind, left in (("shifts", 0.0), ("lures", np.hypot(0.02, 0.02))):
+    for kind, left in (("corrections", 0.0), ("multipliers", np.hypot(0.02, 0.02))):
         journey = journey_of([((0.3, 0.4), {1.0: (0.5, 0.3)})], (0.5, 1.0), **{kind: by})
         value, slope = journey.at(1.0, np.array([[0.52, 0.28]]))
         assert value == pytest.approx(0, abs=1e-12) and np.abs(slope).max() < 1e-9

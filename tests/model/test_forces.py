@@ -12,7 +12,7 @@ from wfluid.domain.paths import Path
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import to_numpy
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import Group, flat
+from wfluid.model.force import Group, flatten
 from wfluid.model.gaussian_forces import GaussianForce, Growth, VortexForce
 from wfluid.model.noise_force import NoiseForce
 from wfluid.model.painted import Painted
@@ -20,7 +20,7 @@ from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Wind
 from wfluid.scene.short_forms import parse_force
 from wfluid.staging.drawing import Drawing
-from wfluid.step.forcing import Impulses
+from wfluid.step.forcing import Forcing
 
 STRETCHED = Grid(40, 30, 1.0, 0.71)
 """hx != hy, and 40 is no multiple of a span."""
@@ -114,7 +114,7 @@ def test_a_wind_beyond_the_limit_is_refused_with_the_velocity_it_would_give(devi
     """The limit holds for the whole vector, (6e3, 8e3) times the blow: 1e5 longer sides/s."""
     wind = Wind((6e3, 8e3), blow * Instantaneous())
     fluid = Fluid(walls="periodic")
-    impulses = Impulses([wind], fluid, Grid(5, 4), device)
+    impulses = Forcing([wind], fluid, Grid(5, 4), device)
     if abs(blow) < 10:
         impulses.set([wind], fluid, 0.0, 0.1, 0.1)
         return
@@ -156,13 +156,13 @@ def test_a_stroke_gives_its_strength_times_its_velocity():
     assert path.times == pytest.approx((0.2, 0.8, 1.0))
     steps, gained = 960, np.zeros(2)
     for n in range(steps):
-        blob = stroke.over(n / steps * 1.2, (n + 1) / steps * 1.2)
+        blob = stroke.impulse(n / steps * 1.2, (n + 1) / steps * 1.2)
         distance = math.dist(blob.center, (0.4, 0.3))
         gained += np.array(blob.push) * math.exp(-(distance**2) / (2 * 0.03**2))
     np.testing.assert_allclose(gained, (0.5 * 1.0, 0.0), atol=5e-3)
-    corner = stroke.over(0.78, 0.82).push
+    corner = stroke.impulse(0.78, 0.82).push
     assert corner[0] == pytest.approx(corner[1]) and corner[0] > 0
-    assert stroke.over(0.0, 0.1).push == (0.0, 0.0) == stroke.over(1.0, 1.1).push
+    assert stroke.impulse(0.0, 0.1).push == (0.0, 0.0) == stroke.impulse(1.0, 1.1).push
 
 
 def test_groups_equal_the_sum_of_their_members(make_solver):
@@ -183,7 +183,7 @@ def test_groups_equal_the_sum_of_their_members(make_solver):
     ]
     for n in (0, 1):
         np.testing.assert_allclose(got[n], sum(f[n] for f in alone), atol=3e-7)
-    assert len(flat([group, one])) == 4
+    assert len(flatten([group, one])) == 4
 
 
 @pytest.mark.parametrize("walls", ["free-slip", "no-slip", "periodic", "periodic,free-slip"])

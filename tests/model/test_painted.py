@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from wfluid import Fluid, Freeze, Grid, Keyed, Painted, Picture, read_picture, write_picture
-from wfluid.model.painted import value_on
+from wfluid.model.painted import sample_at
 from wfluid.pictures.color import to_linear
 from wfluid.pictures.picture import intensity
 
@@ -47,24 +47,24 @@ def test_values_above_the_range_are_cut_off():
 def test_a_painting_keeps_its_mean_and_its_range_at_any_size(values):
     """Averaged onto fewer cells, stretched onto more: no overshoot, the same amount of paint."""
     for grid in (Grid(8, 6), Grid(16, 12), Grid(37, 23)):
-        on = Painted(values).on(grid)
+        on = Painted(values).sample(grid)
         assert on.shape == (grid.ny, grid.nx)
         assert values.min() - 1e-6 <= on.min() and on.max() <= values.max() + 1e-6
-    constant = Painted(np.full((5, 9), 0.3)).on(GRID)
+    constant = Painted(np.full((5, 9), 0.3)).sample(GRID)
     np.testing.assert_allclose(constant, 0.3, rtol=1e-6)
 
 
 def test_shrinking_does_not_alias():
     """A checkerboard of single pixels becomes grey, not stripes."""
     board = np.indices((120, 160)).sum(axis=0) % 2.0
-    np.testing.assert_allclose(Painted(board).on(GRID)[1:-1, 1:-1], 0.5, atol=0.02)
+    np.testing.assert_allclose(Painted(board).sample(GRID)[1:-1, 1:-1], 0.5, atol=0.02)
 
 
 def test_paint_lands_where_it_is_painted():
     """A square over three by three cells: full in its middle, nothing two cells away."""
     values = np.zeros((60, 80))
     values[10:40, 40:70] = 1.0
-    on = Painted(values, scale=3.0).on(GRID)
+    on = Painted(values, scale=3.0).sample(GRID)
     assert np.unravel_index(on.argmax(), on.shape) == (2, 5) and on[2, 5] == pytest.approx(3.0)
     assert on[:, :3].max() == 0 and on[5].max() == 0
 
@@ -79,7 +79,7 @@ def test_scale_floor_and_inversion():
 def test_freezing_is_drag_on_a_logarithmic_scale():
     """(1 + strength)^m - 1: nothing without paint, all with full paint, equal factors for equal degrees."""
     mask = np.array([[0.0, 0.25], [0.5, 1.0]])
-    drag = Freeze(mask, 9999.0).on(Grid(4, 4))[::3, ::3]
+    drag = Freeze(mask, 9999.0).sample(Grid(4, 4))[::3, ::3]
     np.testing.assert_allclose(drag[0, 0], 0.0, atol=1e-9)
     np.testing.assert_allclose(drag[1, 1], 9999.0, rtol=1e-6)
     np.testing.assert_allclose((1 + drag[0, 1]) ** 2, 1 + drag[1, 0], rtol=1e-5)
@@ -89,12 +89,12 @@ def test_keys_are_joined_by_straight_lines_and_held_outside():
     low, high = np.zeros((6, 8)), np.ones((6, 8))
     keyed = Keyed({1.0: high, 0.5: low, 3.0: 0.25})
     for t, expected in ((0.0, 0.0), (0.5, 0.0), (0.625, 0.25), (1.0, 1.0), (2.0, 0.625), (9.0, 0.25)):
-        np.testing.assert_allclose(value_on(keyed, GRID, t), expected)
+        np.testing.assert_allclose(sample_at(keyed, GRID, t), expected)
 
 
 def test_a_function_of_time_may_give_anything():
     for given_back in (0.5, np.full((3, 3), 0.5), Painted(np.ones((2, 2)), 0.5), Keyed({0.0: 0.5})):
-        np.testing.assert_allclose(value_on(lambda t, g=given_back: g, GRID, 1.0), 0.5)
+        np.testing.assert_allclose(sample_at(lambda t, g=given_back: g, GRID, 1.0), 0.5)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_function_of_time_may_give_anything():
         (lambda: Keyed({}), "expected values at one finite time"),
         (lambda: Keyed({float("inf"): 0.1}), "finite time"),
         (lambda: Keyed({0.0: -0.1}), "keyed value -0.1"),
-        (lambda: value_on(lambda t: -t, GRID, 2.0), "viscosity at 2 s -2.0"),
+        (lambda: sample_at(lambda t: -t, GRID, 2.0), "viscosity at 2 s -2.0"),
     ],
 )
 def test_what_is_no_viscosity_or_drag_is_refused(make, message):

@@ -9,7 +9,7 @@ import pytest
 
 from wfluid import Animation, Fluid, GaussianForce, Grid, Picture, Solver, Timeline, VortexForce, Wind
 from wfluid.fields.device import open_device
-from wfluid.morphing.flow_maps import passage_of
+from wfluid.morphing.flow_maps import flow_maps
 
 WALLS = ("free-slip", "no-slip", "periodic", "periodic,no-slip")
 
@@ -26,7 +26,7 @@ FINER = ((32, 6), (64, 12), (128, 24))
 def turned(device, cells, steps, walls="free-slip"):
     """The passage of `TURN`."""
     fluid, grid = Fluid(viscosity=0.01, walls=walls), Grid.for_picture(4, 3, cells)
-    return passage_of(Solver(grid, fluid, open_device(device)), TURN, timeline(steps))
+    return flow_maps(Solver(grid, fluid, open_device(device)), TURN, timeline(steps))
 
 
 def timeline(steps):
@@ -50,7 +50,7 @@ def test_a_constant_wind_shifts_both_ways(make_solver):
     """
     solver, times = make_solver(24, 17, walls="periodic", viscosity=0.02), Timeline(0.5, 12, 2)
     a = np.array([0.9, -0.5])
-    passage = passage_of(solver, [Wind(tuple(a))], times)
+    passage = flow_maps(solver, [Wind(tuple(a))], times)
 
     def moved(step):
         return a * times.dt**2 * step * (step - 1) / 2
@@ -66,7 +66,7 @@ def test_a_constant_wind_shifts_both_ways(make_solver):
 
 
 def test_nothing_moves_without_forces(make_solver):
-    passage = passage_of(make_solver(16, 12), (), Timeline(0.5, 12, 2))
+    passage = flow_maps(make_solver(16, 12), (), Timeline(0.5, 12, 2))
     assert not passage.from_start.any() and not passage.to_end.any()
 
 
@@ -107,7 +107,7 @@ def test_with_every_wall_each_way_undoes_the_other(name, walls):
 def test_inconsistency_tells_maps_that_belong_to_different_flows(make_solver):
     """Shifts that are a cell apart miss by a cell, everywhere."""
     solver = make_solver(24, 17, walls="periodic", viscosity=0.02)
-    passage = passage_of(solver, [Wind((0.9, -0.5))], Timeline(0.5, 12, 2))
+    passage = flow_maps(solver, [Wind((0.9, -0.5))], Timeline(0.5, 12, 2))
     off = replace(passage, to_end=passage.to_end + np.float32([1 / 24, 0]))
     np.testing.assert_allclose(off.inconsistency(), 1 / 24, rtol=1e-5)
 
@@ -185,4 +185,4 @@ def test_a_flow_that_is_not_finite_is_refused(make_solver, monkeypatch):
     blown = lambda now, spare, *_, **__: solver.set_map(spare, np.full((12, 16, 2), np.nan))  # noqa: E731
     monkeypatch.setattr(solver, "step", blown)
     with pytest.raises(FloatingPointError, match="no longer finite"):
-        passage_of(solver, (), Timeline(0.5, 12, 1))
+        flow_maps(solver, (), Timeline(0.5, 12, 1))

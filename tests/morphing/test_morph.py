@@ -25,7 +25,7 @@ from morph_cases import (
 from wfluid import Painted, Picture, Timeline, morph
 from wfluid.keyframes.match import REACHED
 from wfluid.morphing.morph import LEAST_JACOBIAN, TOLERANCE
-from wfluid.morphing.settings import Course
+from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.picture import resample
 
 pytestmark = pytest.mark.beside
@@ -52,7 +52,7 @@ def noise(width, height, channels=3, seed=0, **settings):
     return Picture(pixels.astype(np.float32), **settings)
 
 
-def flat(width, height, value):
+def flatten(width, height, value):
     return Picture(np.full((height, width, 3), value, np.float32))
 
 
@@ -66,12 +66,12 @@ def quick(a, b, points=(((0.4, 0.3), (0.45, 0.3)),), **settings):
 def test_the_ends_are_the_pictures_to_the_bit(morph_of, name):
     found = morph_of(name)
     frames = list(found.frames())
-    assert len(frames) == found.frame_count == found.course.timeline.frames
+    assert len(frames) == found.frame_count == found.settings.timeline.frames
     np.testing.assert_array_equal(frames[0].picture.pixels, found.pair.a.pixels)
     np.testing.assert_array_equal(frames[-1].picture.pixels, found.pair.b.pixels)
     assert not frames[0].map.displacement.any() and not frames[-1].to_map.displacement.any()
     assert [frame.index for frame in frames] == list(range(len(frames)))
-    assert [frame.time for frame in frames] == [n / found.course.timeline.fps for n in range(len(frames))]
+    assert [frame.time for frame in frames] == [n / found.settings.timeline.fps for n in range(len(frames))]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -132,7 +132,7 @@ def test_what_corresponds_lies_at_one_place_in_both_warped_pictures(morph_of):
     Weights of 0 and of 1 show each warped picture alone. A residual is up to 0.5 / 512, 0.23 px, in each.
     """
     found = morph_of("dots")
-    end, count = found.course.timeline.end, found.course.timeline.frames
+    end, count = found.settings.timeline.end, found.settings.timeline.frames
     alone = []
     for weight in (0.0, 1.0):
         keys = {(n + 1) / (count - 1) * end: weight for n in range(count - 2)}
@@ -182,7 +182,7 @@ def test_a_picture_that_becomes_itself_is_still(device_name):
 
 def test_the_blend_follows_its_curve_and_its_light(morph_of):
     """Black becomes white: every frame's grey is the curve's value, of light or of sRGB codes."""
-    flats = of_pictures(morph_of("dots"), flat(SIDE, HEIGHT, 0.0), flat(SIDE, HEIGHT, 1.0))
+    flats = of_pictures(morph_of("dots"), flatten(SIDE, HEIGHT, 0.0), flatten(SIDE, HEIGHT, 1.0))
     parts = np.linspace(0, 1, flats.frame_count)
     for light in ("linear", "display"):
         for curve, values in (("linear", parts), ("ease", 3 * parts**2 - 2 * parts**3)):
@@ -208,7 +208,7 @@ def test_the_warp_follows_its_curve(morph_of):
 
 def test_where_the_mask_is_white_it_is_the_second_picture_when_black_is_still_the_first(morph_of):
     """A delay of half the time: half way, white has arrived and black not begun, in warp and in blend."""
-    flats = of_pictures(morph_of("dots"), flat(SIDE, HEIGHT, 0.25), flat(SIDE, HEIGHT, 0.75))
+    flats = of_pictures(morph_of("dots"), flatten(SIDE, HEIGHT, 0.25), flatten(SIDE, HEIGHT, 0.75))
     found = going(flats, mask=Painted(SPLIT), delay=0.5)
     frames = list(found.frames())
     half = frames[3]
@@ -245,15 +245,15 @@ def test_a_sharp_mask_is_softened_for_the_warp_and_that_is_said(morph_of):
     sharp = found.passage.since_start(np.repeat((np.arange(32) < 16)[:, None], 48, axis=1).astype(float))
     slopes = np.diff(sharp.source_of[..., 1], axis=0) * 48
     assert slopes.min() < 0, "the sharp one does not fold: the test would say nothing"
-    flats = of_pictures(found, flat(SIDE, HEIGHT, 0.0), flat(SIDE, HEIGHT, 1.0))
+    flats = of_pictures(found, flatten(SIDE, HEIGHT, 0.0), flatten(SIDE, HEIGHT, 1.0))
     *_, half, _, _, _ = flats.frames()
     assert half.picture.pixels[78].min() > 1 - 1e-6 and half.picture.pixels[81].max() < 1e-6
 
 
 def test_a_soft_mask_or_no_delay_is_left_as_it_is(morph_of):
     soft = Painted(np.linspace(1, 0, 120)[None, :] * np.ones((80, 1)))
-    for course in ({"mask": soft, "delay": 0.3}, {"mask": Painted(SPLIT), "delay": 0.0}):
-        found = going(morph_of("dots"), **course)
+    for settings in ({"mask": soft, "delay": 0.3}, {"mask": Painted(SPLIT), "delay": 0.0}):
+        found = going(morph_of("dots"), **settings)
         list(found.frames())
         assert found.said == []
 
@@ -285,9 +285,9 @@ def test_reverse_is_the_frames_in_reverse_bit_for_bit(morph_of, mask):
 def test_pingpong_goes_back_without_showing_an_end_twice(morph_of, reverse):
     """0 1 2 … n - 1 … 2 1: shown again and again no frame stands twice."""
     plain = going(morph_of("dots"), reverse=reverse)
-    looped = going(plain, pingpong=True)
-    frames, once = pixels_of(looped), pixels_of(plain)
-    assert len(frames) == looped.frame_count == 12
+    fit_to_loop = going(plain, pingpong=True)
+    frames, once = pixels_of(fit_to_loop), pixels_of(plain)
+    assert len(frames) == fit_to_loop.frame_count == 12
     for n, pixels in enumerate(frames):
         np.testing.assert_array_equal(pixels, once[n if n < 7 else 12 - n])
 
@@ -302,12 +302,16 @@ def test_pingpong_goes_back_without_showing_an_end_twice(morph_of, reverse):
     ],
 )
 def test_frames_are_in_order(reverse, pingpong, order):
-    assert Course(Timeline(1, 3), reverse=reverse, pingpong=pingpong).order == order
+    assert MorphSettings(Timeline(1, 3), reverse=reverse, pingpong=pingpong).order == order
 
 
 def test_two_frames_are_both_pictures():
     """The shortest morph there is; there and back is the same two."""
-    assert Course(Timeline(0.1, 10)).order == Course(Timeline(0.1, 10), pingpong=True).order == [0, 1]
+    assert (
+        MorphSettings(Timeline(0.1, 10)).order
+        == MorphSettings(Timeline(0.1, 10), pingpong=True).order
+        == [0, 1]
+    )
 
 
 # Pictures of other kinds and sizes
@@ -393,7 +397,7 @@ def test_points_may_be_rows_of_four_numbers(device_name):
 
 
 @pytest.mark.parametrize(
-    ("course", "says"),
+    ("settings", "says"),
     [
         ({"warp_curve": "fast"}, "curve 'fast'"),
         ({"blend_curve": {0.2: 3}}, "values 0 … 1"),
@@ -404,9 +408,9 @@ def test_points_may_be_rows_of_four_numbers(device_name):
         ({"mask": Painted(np.full((2, 2), 1.5))}, "a timing mask: expected values 0 … 1"),
     ],
 )
-def test_a_course_that_makes_no_sense_is_refused(course, says):
+def test_a_course_that_makes_no_sense_is_refused(settings, says):
     with pytest.raises(ValueError, match=says):
-        Course(Timeline(0.5, 8), **course)
+        MorphSettings(Timeline(0.5, 8), **settings)
 
 
 def test_a_fit_that_does_not_exist_is_refused_before_the_search():

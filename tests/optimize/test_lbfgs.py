@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from more_garbow_hillstrom import PROBLEMS
 from scipy.optimize import least_squares
 
-from wfluid.optimize.lbfgs import Minimum, Settings, State, Status, descent_direction, minimise
+from wfluid.optimize.lbfgs import Iterate, Minimum, Settings, Status, descent_direction, minimise
 from wfluid.optimize.line_search import Ending, Rules, Sample, search
 
 LIMITS = {"iterations": 10_000, "evaluations": 10_000}
@@ -743,7 +743,7 @@ def test_gradients_of_another_shape_are_refused():
 
 
 def test_a_state_tells_where_it_is():
-    states: list[State] = []
+    states: list[Iterate] = []
     minimise(quadratic, np.array([3.0, 4.0]), callback=states.append)
     for number, state in enumerate(states, start=1):
         assert state.iteration == number and state.value == state.values[-1] == quadratic(state.x)[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wfluid import Picture
-from wfluid.pictures.blend import LIGHTS, blended, check_light
+from wfluid.pictures.blend import BLEND_SPACES, blended, check_light
 
 HALF_GREY = ((0.5 + 0.055) / 1.055) ** 2.4
 """The light of sRGB's 0.5, by its definition (IEC 61966-2-1)."""
@@ -26,7 +26,7 @@ def shown(light):
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
-def flat(value, channels=3, **settings):
+def flatten(value, channels=3, **settings):
     return Picture(np.full((2, 3, channels), value, np.float32), **settings)
 
 
@@ -40,7 +40,7 @@ def test_light_is_mixed_by_parts(alpha):
 
 
 def test_black_and_white_are_half_of_the_light_or_half_of_the_code():
-    black, white = flat(0), flat(1)
+    black, white = flatten(0), flatten(1)
     np.testing.assert_allclose(blended(black, white, 0.5, "linear").pixels, 0.5, rtol=1e-6)
     np.testing.assert_allclose(blended(black, white, 0.5, "display").pixels, HALF_GREY, rtol=1e-6)
 
@@ -65,7 +65,7 @@ def test_display_values_are_those_of_what_is_not_multiplied_and_alpha_is_mixed_a
     )
 
 
-@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("light", BLEND_SPACES)
 def test_what_is_transparent_gives_no_colour(light):
     """A clear pixel fades the other's alpha and leaves its colour."""
     clear, red = np.zeros((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32)
@@ -74,7 +74,7 @@ def test_what_is_transparent_gives_no_colour(light):
     np.testing.assert_allclose(mixed, red * 0.25, atol=1e-6)
 
 
-@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("light", BLEND_SPACES)
 @pytest.mark.parametrize("alpha", [None, 3])
 def test_none_or_all_of_it_is_the_picture_to_the_bit(light, alpha):
     a, b = noise(0, 4, alpha), noise(1, 4, alpha)
@@ -83,7 +83,7 @@ def test_none_or_all_of_it_is_the_picture_to_the_bit(light, alpha):
         np.testing.assert_array_equal(blended(a, b, one, light).pixels, b.pixels)
 
 
-@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("light", BLEND_SPACES)
 def test_every_pixel_has_its_own_weight(light):
     """As if each were blended alone."""
     a, b, weight = noise(0), noise(1), np.random.default_rng(2).random((6, 9))
@@ -97,17 +97,17 @@ def test_every_pixel_has_its_own_weight(light):
 def test_both_lights_agree_where_the_pictures_do():
     """To the accuracy of the transfer function and its inverse in single precision."""
     a = noise(0)
-    for light in LIGHTS:
+    for light in BLEND_SPACES:
         np.testing.assert_allclose(blended(a, a, 0.37, light).pixels, a.pixels, rtol=2e-6)
 
 
 def test_numbers_that_are_no_colours_know_no_display():
-    a, b = flat(0.0, data=True), flat(1.0, data=True)
+    a, b = flatten(0.0, data=True), flatten(1.0, data=True)
     np.testing.assert_allclose(blended(a, b, 0.5, "display").pixels, 0.5, rtol=1e-6)
 
 
 def test_a_mix_is_of_the_first_pictures_kind():
-    a, b = flat(0.2, dtype="uint8"), flat(0.4, dtype="half")
+    a, b = flatten(0.2, dtype="uint8"), flatten(0.4, dtype="half")
     for weight in (0, 0.5, 1):
         assert blended(a, b, weight).dtype == "uint8"
 

@@ -8,9 +8,9 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Rule
 from wfluid.fields.arrays import field, from_numpy, to_numpy
 from wfluid.solve.chebyshev import chebyshev_count, chebyshev_factors
-from wfluid.solve.multigrid import Points, hierarchy
+from wfluid.solve.multigrid import Location, hierarchy
 from wfluid.solve.operators import FIVE_POINT_INTERVAL, FivePoint
-from wfluid.solve.system import LinearSystem, Solve
+from wfluid.solve.system import LinearSystem, SolveMethod
 
 SIZES = ((16, 16), (31, 24), (37, 29), (53, 8), (6, 61))
 KINDS = {
@@ -37,7 +37,7 @@ def system_for(kind, nx, ny, device):
     shift, scale, rules, on_faces, _ = KINDS[kind]
     longer = max(nx, ny)
     grid = Grid(nx, ny, nx / longer, ny / longer)
-    system = five_point(nx, ny, (grid.width, grid.height), Points(rules, on_faces), shift, scale, device)
+    system = five_point(nx, ny, (grid.width, grid.height), Location(rules, on_faces), shift, scale, device)
     cut = (slice(int(rules[1] is Rule.FACE), ny), slice(int(rules[0] is Rule.FACE), nx))
     return system, grid, cut
 
@@ -51,7 +51,7 @@ def right_hand_side(kind, grid, cut, seed=0):
 
 
 def solve(system, b, cycles=None, sweeps=None, how=None):
-    how = how or (Solve("jacobi", sweeps) if sweeps else Solve("multigrid", cycles))
+    how = how or (SolveMethod("jacobi", sweeps) if sweeps else SolveMethod("multigrid", cycles))
     layout = system.levels[0].layout
     rhs, x = field(layout, system.device), field(layout, system.device)
     from_numpy(b, rhs, layout)
@@ -111,7 +111,7 @@ def test_a_planned_solve_keeps_its_tolerance_and_is_symmetric(device, scale, tol
     """On white noise, for every stiffness: few Chebyshev sweeps where that is enough, cycles beyond."""
     kind = "v no-slip"
     _, grid, cut = system_for(kind, 41, 32, device)
-    points = Points(*KINDS[kind][2:4])
+    points = Location(*KINDS[kind][2:4])
     system = five_point(41, 32, (grid.width, grid.height), points, 1.0, scale, device)
     top = system.levels[0]
     how = system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance) or system.plan_cycles(tolerance)
@@ -119,7 +119,7 @@ def test_a_planned_solve_keeps_its_tolerance_and_is_symmetric(device, scale, tol
     (mp, residual), (mq, _) = solve(system, p, how=how), solve(system, q, how=how)
     assert residual.relative <= tolerance
     if scale == 0:
-        assert how == Solve("chebyshev", 1) and residual.relative < 1e-15
+        assert how == SolveMethod("chebyshev", 1) and residual.relative < 1e-15
     size = np.linalg.norm(p) * np.linalg.norm(mq)
     assert abs(np.sum(p * mq) - np.sum(q * mp)) < 1e-12 * size
 
@@ -138,7 +138,7 @@ def test_the_chebyshev_degree_is_the_least_that_keeps_the_tolerance():
 @pytest.mark.parametrize("stretch", [1, 5, 20])
 def test_cells_far_from_square_converge_too(device, stretch):
     """Cells `stretch` times wider than high: three cycles still leave less than a hundredth."""
-    points = Points((Rule.EVEN, Rule.EVEN))
+    points = Location((Rule.EVEN, Rule.EVEN))
     system = five_point(64, 60, (1.0, 1.0 / stretch), points, 0.0, 1.0, device)
     b = np.random.default_rng(0).standard_normal((60, 64))
     assert solve(system, b - b.mean(), cycles=3)[1].relative < 1e-2

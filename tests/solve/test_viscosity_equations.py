@@ -9,7 +9,7 @@ from viscous_media import DT, MEDIA, WALLS, centres, coupled, frozen, media, ran
 from wfluid import Fluid
 from wfluid.domain.grid import Grid
 from wfluid.fields.arrays import to_numpy, vector
-from wfluid.solve.system import Solve
+from wfluid.solve.system import SolveMethod
 from wfluid.step.diffusion import CoupledDiffusion, SeparateDiffusion
 
 
@@ -45,7 +45,7 @@ def test_operator_and_solve_equal_a_separately_assembled_matrix(device, name, wa
     got, expected = -unknowns(x, layout, free), matrix @ unknowns(b, layout, free)
     np.testing.assert_allclose(got, expected, atol=1e-12 * np.abs(expected).max())
 
-    how = Solve("conjugate gradients", 200, 1e-11)
+    how = SolveMethod("conjugate gradients", 200, 1e-11)
     system.solve(how, b, x)
     exact = spsolve(matrix, unknowns(b, layout, free))
     np.testing.assert_allclose(unknowns(x, layout, free), exact, atol=1e-8 * np.abs(exact).max())
@@ -61,7 +61,7 @@ def test_fixed_cycles_are_a_symmetric_operator(device, name, walls):
     diffusion = coupled(grid, *media(grid)[name], walls, device)
     system, layout = diffusion.system, diffusion.layout
     p, q = random_vector(diffusion, 1), random_vector(diffusion, 2)
-    for how in (Solve("multigrid", 1), Solve("multigrid", 3), Solve("jacobi", 7)):
+    for how in (SolveMethod("multigrid", 1), SolveMethod("multigrid", 3), SolveMethod("jacobi", 7)):
         mp, mq = vector(layout, device, 2), vector(layout, device, 2)
         system.solve(how, p, mp)
         system.solve(how, q, mq)

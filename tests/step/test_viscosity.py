@@ -8,7 +8,7 @@ from viscous_media import MEDIA, WALLS, centres, coupled, disc, media, random_ve
 from wfluid import Freeze, GaussianForce, Instantaneous, Keyed, Painted
 from wfluid.domain.grid import Grid
 from wfluid.fields.arrays import from_numpy, to_numpy, vector
-from wfluid.step.step import Stages
+from wfluid.step.step import Step
 
 
 def steady(make_solver, ny, force_rows):
@@ -231,7 +231,7 @@ def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_s
 
     But for the pressure kept from step to step, which only a still one may keep.
     """
-    monkeypatch.setattr(Stages, "kept", lambda self, *last: 0.0)
+    monkeypatch.setattr(Step, "kept", lambda self, *last: 0.0)
     mu = np.random.default_rng(1).random((24, 32)) * 0.05
     force = GaussianForce((0.5, 0.4), (1.0, 0.5), 0.1)
     ends = []

@@ -98,9 +98,9 @@ def searched(name, device):
     return morph(round_picture(), round_picture(ANGLE), points, 1.0, 4, cells=40, device=device, **LINEAR)
 
 
-def going(found, **course):
+def going(found, **changes):
     """A morph on the same flow that goes another way."""
-    return replace(found, course=replace(found.course, **course), said=[])
+    return replace(found, settings=replace(found.settings, **changes), said=[])
 
 
 def of_pictures(found, a, b):

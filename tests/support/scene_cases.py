@@ -12,7 +12,7 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.domain.paths import place_at
-from wfluid.model.force import BlobForce, Group, flat
+from wfluid.model.force import Group, LocalForce, flatten
 
 SIDE = 60
 """Longer side of the pictures [px]."""
@@ -55,7 +55,7 @@ def get(path):
 
 
 def force_of(animation):
-    return flat(animation.forces)[0]
+    return flatten(animation.forces)[0]
 
 
 def source_of(animation):
@@ -78,8 +78,8 @@ def groups(animation):
 def work(animation):
     """What the force gives in each quarter of a second: push, turn, swelling; or a field's strength."""
     force = force_of(animation)
-    if isinstance(force, BlobForce):
-        blobs = [force.over(t, t + 0.25) for t in QUARTERS]
+    if isinstance(force, LocalForce):
+        blobs = [force.impulse(t, t + 0.25) for t in QUARTERS]
         return [[*blob.push, blob.turn / blob.radius, blob.swell / 4] for blob in blobs]
     strength = force.vector if hasattr(force, "vector") else [force.strength]
     return [[part * force.envelope.integral(t, t + 0.25) for part in strength] for t in QUARTERS]
@@ -96,7 +96,7 @@ def places_of_source(animation):
 
 def poured(animation):
     """Density that the source pours in each quarter of a second."""
-    return [source_of(animation).over(t, t + 0.25).amount for t in QUARTERS]
+    return [source_of(animation).impulse(t, t + 0.25).amount for t in QUARTERS]
 
 
 def sides(values):

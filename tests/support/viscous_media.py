@@ -4,7 +4,7 @@ import numpy as np
 
 from wfluid import Fluid, Freeze
 from wfluid.fields.arrays import from_numpy, vector
-from wfluid.step.coefficients import Medium
+from wfluid.step.coefficients import Coefficients
 from wfluid.step.diffusion import CoupledDiffusion
 
 WALLS = ("free-slip", "no-slip", "periodic", "no-slip,periodic", "free-slip,no-slip")
@@ -51,9 +51,9 @@ def frozen(alpha):
 def coupled(grid, mu, alpha, walls, device, dt=DT, **settings):
     """The coupled diffusion of a medium, ready."""
     fluid = Fluid(viscosity=mu, freeze=frozen(alpha), walls=walls, **settings)
-    medium = Medium(grid, fluid, device)
+    medium = Coefficients(grid, fluid, device)
     diffusion = CoupledDiffusion(fluid, medium, device)
-    medium.follow(0.0, dt)
+    medium.set_time(0.0, dt)
     diffusion.plan(dt)
     medium.spread()
     diffusion.prepare()

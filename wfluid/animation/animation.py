@@ -7,19 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from wfluid.animation.frame import Frame, Seconds
-from wfluid.animation.loops import Seam, check_loop, frames_of, looped, looping
-from wfluid.animation.simulation import Moment, Runner
+from wfluid.animation.frame import Frame, FrameTimes
+from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
+from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.domain.grid import LEAST_CELLS, Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import Force, Group, flat
+from wfluid.model.force import Force, Group, flatten
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.sampling import check_look_up
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
-from wfluid.view.densities import show_densities
+from wfluid.view.densities import composite_densities
 from wfluid.view.lookup import LookUp
 from wfluid.view.quality import measure_map
 
@@ -65,7 +65,7 @@ class Animation:
     """"oscillate", "pingpong" or "crossfade": the frames follow one another without end."""
     seam: Seam = field(default_factory=Seam, compare=False)
     """How well the loop's end meets its beginning, filled in when all frames are made."""
-    seconds: Seconds = field(default_factory=Seconds, compare=False)
+    seconds: FrameTimes = field(default_factory=FrameTimes, compare=False)
     """Where the time went, filled in while frames are made."""
 
     def __post_init__(self) -> None:
@@ -76,10 +76,10 @@ class Animation:
         check_look_up(self.filter, self.edge)
         if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
             raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
-        forces = flat(self.forces)
+        forces = flatten(self.forces)
         if self.loop is not None:
             check_loop(self.loop, forces)
-            forces = tuple(looped(force, self._loop_frames / self.timeline.fps) for force in forces)
+            forces = tuple(fit_to_loop(force, self._loop_frames / self.timeline.fps) for force in forces)
         object.__setattr__(self, "_acting", forces)
 
     @property
@@ -103,12 +103,12 @@ class Animation:
         self.seconds.compile = solver.compile_seconds
         return solver
 
-    def _moments(self) -> Iterator[Moment]:
+    def _moments(self) -> Iterator[SimulatedFrame]:
         """The fluid at every frame."""
-        runner = Runner(self.solver, self.timeline, self.points)
+        runner = Simulation(self.solver, self.timeline, self.points)
         if self.loop is None:
             return runner.moments(self._acting, self.timeline.frames - 1)
-        return looping(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
+        return loop_frames(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
 
     def look_up(self, picture: Picture) -> LookUp:
         """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
@@ -142,7 +142,7 @@ class Animation:
                 for look_up in (shown, *layers.values())
             )
             densities = state.densities
-            picture = show_densities(picture, self.fluid.densities, densities, walls.periodic)
+            picture = composite_densities(picture, self.fluid.densities, densities, walls.periodic)
             self.seconds.simulate += simulated - began
             self.seconds.lookup += clock() - simulated
             yield Frame(

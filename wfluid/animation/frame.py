@@ -37,7 +37,7 @@ class Frame:
 
 
 @dataclass
-class Seconds:
+class FrameTimes:
     """Where the time of an animation went [s]."""
 
     compile: float = 0.0

@@ -19,7 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from wfluid.animation.simulation import Moment, Runner
+from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.envelopes import Envelope, Instantaneous, Oscillator, Product, product
 from wfluid.domain.timeline import LOOPS
@@ -65,7 +65,7 @@ def check_loop(loop: str, forces: Sequence[Force]) -> None:
         )
 
 
-def looped(force: Force, length: float) -> Force:
+def fit_to_loop(force: Force, length: float) -> Force:
     """The force with all its periods fitted to a loop of `length` seconds.
 
     An oscillator goes on through the seam: when it starts shifts only its phase.
@@ -97,7 +97,7 @@ def _oscillates(force: Force) -> bool:
     return noise or any(isinstance(factor, Oscillator) for factor in factors)
 
 
-def blows(forces: Sequence[Force], length: float, steps: int) -> list[Force]:
+def starting_impulses(forces: Sequence[Force], length: float, steps: int) -> list[Force]:
     """What to strike the resting fluid with, so that each force's velocity swings about zero in its loop.
 
     A force e(t) has given the integral E(t) of e; the blow is minus E's mean over the loop.
@@ -119,9 +119,9 @@ def frames_of(loop: str, frames: int) -> int:
     return 2 * max(1, round(frames / 2)) if loop == "pingpong" else max(1, frames)
 
 
-def looping(
-    loop: str, runner: Runner, forces: Sequence[Force], frames: int, fps: float, seam: Seam
-) -> Iterator[Moment]:
+def loop_frames(
+    loop: str, runner: Simulation, forces: Sequence[Force], frames: int, fps: float, seam: Seam
+) -> Iterator[SimulatedFrame]:
     """The moments to show, one a frame, and the seam's figures when they are through.
 
     A moment's state is overwritten when the next is asked for.
@@ -144,9 +144,13 @@ def looping(
         seam.velocity_mean = max(seam.velocity_mean, float(jump.mean()))
 
 
-def _oscillating(runner: Runner, forces: Sequence[Force], frames: int, seam: Seam) -> Iterator[Moment]:
+def _oscillating(
+    runner: Simulation, forces: Sequence[Force], frames: int, seam: Seam
+) -> Iterator[SimulatedFrame]:
     """A lap for the flow, then one from the untouched picture, its end bent to meet its beginning."""
-    struck = blows(forces, runner.timeline.time_of(frames * runner.timeline.steps_per_frame), frames)
+    struck = starting_impulses(
+        forces, runner.timeline.time_of(frames * runner.timeline.steps_per_frame), frames
+    )
     for _ in runner.moments(forces, frames, struck):
         pass
     runner.untouch()
@@ -163,7 +167,7 @@ def _oscillating(runner: Runner, forces: Sequence[Force], frames: int, seam: Sea
         s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
         fade = s * s * (3 - 2 * s)  # densities do not swing: towards the end they flow into their beginning
         poured = Snapshot.sum_of((1 - fade, snapshot), (fade, first))
-        yield Moment(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
+        yield SimulatedFrame(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
 
 
 def _bend(n: int, frames: int) -> float:
@@ -176,17 +180,17 @@ def _bend(n: int, frames: int) -> float:
     return reach / 2 * (s**3 - s**2)
 
 
-def _turning(runner: Runner, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[Moment]:
+def _turning(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[SimulatedFrame]:
     """Half the frames, then back the same way."""
     kept: list[Snapshot] = []
     for moment in runner.moments(forces, frames // 2):
         kept.append(Snapshot.of(moment.state))
         yield moment
     for snapshot in kept[-2::-1]:
-        yield Moment(snapshot.onto(runner.now), None)
+        yield SimulatedFrame(snapshot.onto(runner.now), None)
 
 
-def _fading(runner: Runner, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[Moment]:
+def _fading(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[SimulatedFrame]:
     """From where the fade ends to the end, then what follows it, flowing into the beginning."""
     fading = max(1, round(FADE * frames))
     kept: list[Snapshot] = []
@@ -199,4 +203,4 @@ def _fading(runner: Runner, forces: Sequence[Force], frames: int, _: Seam) -> It
             s = (n - frames) / fading
             weight = s * s * (3 - 2 * s)
             mixed = Snapshot.sum_of((1 - weight, Snapshot.of(moment.state)), (weight, kept[n - frames]))
-            yield Moment(mixed.onto(runner.spare), moment.solve)
+            yield SimulatedFrame(mixed.onto(runner.spare), moment.solve)

@@ -26,7 +26,7 @@ class PoorSolveWarning(UserWarning):
 
 
 @dataclass(frozen=True)
-class Moment:
+class SimulatedFrame:
     """The fluid at one frame."""
 
     state: State
@@ -35,7 +35,7 @@ class Moment:
     """What the last step's solves left; None where no step led here."""
 
 
-class Runner:
+class Simulation:
     """Steps a fluid from frame to frame, from rest on."""
 
     def __init__(self, solver: Solver, timeline: Timeline, points: np.ndarray | Sequence = ()):
@@ -48,12 +48,14 @@ class Runner:
     spare: State
     """A state that the next step writes over."""
 
-    def moments(self, forces: Sequence[Force], frames: int, first: Sequence[Force] = ()) -> Iterator[Moment]:
+    def moments(
+        self, forces: Sequence[Force], frames: int, first: Sequence[Force] = ()
+    ) -> Iterator[SimulatedFrame]:
         """The fluid as it is, and then after each of so many frames; the forces' time begins at 0.
 
         The forces `first` act in the first step too.
         """
-        yield Moment(self.now, None)
+        yield SimulatedFrame(self.now, None)
         per_frame, timeline = self.timeline.steps_per_frame, self.timeline
         for index in range(1, frames + 1):
             for step in range((index - 1) * per_frame, index * per_frame):
@@ -63,7 +65,7 @@ class Runner:
                 self.now, self.spare = self.spare, self.now
             solve = self.solver.report()
             self._warned = _judge(solve, self.solver.fluid, index, self._warned)
-            yield Moment(self.now, solve)
+            yield SimulatedFrame(self.now, solve)
 
     def untouch(self) -> None:
         """Let the picture, densities and points be as at rest; the flow goes on."""

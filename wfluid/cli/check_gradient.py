@@ -17,7 +17,7 @@ from wfluid.gradient.variables import POSITIVE, VELOCITY, VISCOSITY, Free, Setup
 from wfluid.kernels.cell.real import Real
 from wfluid.keyframes.keyframes import ParticleKeyframe
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import flat
+from wfluid.model.force import flatten
 from wfluid.scene.scene import Scene
 from wfluid.staging.aims import Aims
 from wfluid.staging.build import stage_all
@@ -66,7 +66,7 @@ def _functional(animation: Animation, aims: Aims | None) -> Functional:
     grid, timeline, device = animation.grid, animation.timeline, animation.device
     fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
     found = aims.found if aims else ()
-    setup = Setup(fluid, (*flat(animation.forces), *found), np.zeros((2, grid.ny, grid.nx)))
+    setup = Setup(fluid, (*flatten(animation.forces), *found), np.zeros((2, grid.ny, grid.nx)))
     names = [name for name in known_names(setup) if not _held(name, setup)]
     free = [Free(name, _scale(name, setup)) for name in names]
     objective = _misfit(aims) if aims else _objective(grid, fluid, timeline.end)

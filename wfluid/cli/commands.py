@@ -22,9 +22,9 @@ def run_warmup(options: argparse.Namespace) -> int:
 
 def run_animate(options: argparse.Namespace) -> int:
     """Make the scene of the flags and run it."""
-    from wfluid.cli.options import scene_of
+    from wfluid.cli.options import scene_of_options
 
-    return _run(scene_of(options), options)
+    return _run(scene_of_options(options), options)
 
 
 def run_render(options: argparse.Namespace) -> int:
@@ -51,9 +51,9 @@ def run_check_gradient(options: argparse.Namespace) -> int:
 
 
 def _run(scene, options: argparse.Namespace) -> int:
-    from wfluid.cli.render import Run, run_scene
+    from wfluid.cli.render import RunOptions, run_scene
 
-    how = Run(
+    how = RunOptions(
         device=options.device,
         quiet=options.quiet,
         dry_run=options.dry_run,

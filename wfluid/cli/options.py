@@ -62,7 +62,7 @@ KEYFRAME_VISCOSITY = 0.005
 """Viscosity where keyframes are on the command line and none is [longer side^2/s]: strains spread wider."""
 
 
-def scene_of(options: argparse.Namespace) -> Scene:
+def scene_of_options(options: argparse.Namespace) -> Scene:
     """The scene of a command line of `wfluid animate`.
 
     Raises:

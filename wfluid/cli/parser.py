@@ -247,13 +247,13 @@ _OUTPUT = _repeated("OUT", "x.gif, x.mp4, x.webm, or a sequence such as x.####.p
 def _drawn(parser: argparse.ArgumentParser) -> None:
     """The flags that say what moves the picture."""
     add = parser.add_argument
-    course = "start, end, at, period, phase, rise, fall, strength"
+    timing = "start, end, at, period, phase, rise, fall, strength"
     add("-o", "--output", **_OUTPUT)
     add(
         "--push",
         **_repeated(
             "X,Y:DX,DY[:key=value,…]",
-            f"push the point X,Y along the arrow DX,DY [px]; keys radius, {course}",
+            f"push the point X,Y along the arrow DX,DY [px]; keys radius, {timing}",
         ),
     )
     spot = "with the keys of a push"

@@ -15,14 +15,14 @@ from wfluid.cli.progress import SearchProgress
 from wfluid.cli.report import Report, write_report
 from wfluid.cli.writing import kept_frames, open_writers, write_frames
 from wfluid.fields.device import kernels_are_built, open_device
-from wfluid.files.names import check_folder, names
+from wfluid.files.names import check_folder, files_written
 from wfluid.keyframes.match import REACHED, STOPPED, Match, match_keyframes
 from wfluid.keyframes.plot import check_plot, plot_match
 from wfluid.keyframes.search import Progress
 from wfluid.morphing.morph import FACTORS as FACTORS_OF_MORPH
 from wfluid.morphing.morph import Morph
-from wfluid.morphing.settings import Course
-from wfluid.pictures.pairing import Pair
+from wfluid.morphing.settings import MorphSettings
+from wfluid.pictures.pairing import PicturePair
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import write_picture
 from wfluid.scene.scene import Output, Scene
@@ -40,7 +40,7 @@ STREAMED = 0.5
 
 
 @dataclass(frozen=True)
-class Run:
+class RunOptions:
     """How a scene is run."""
 
     device: str | None = None
@@ -57,7 +57,7 @@ class Run:
     """Draw what keyframes came to, to this file."""
 
 
-def run_scene(scene: Scene, how: Run) -> int:
+def run_scene(scene: Scene, how: RunOptions) -> int:
     """Run a scene; the exit code.
 
     Raises:
@@ -77,8 +77,8 @@ def run_scene(scene: Scene, how: Run) -> int:
 
     notes: list[str] = []
     staged = stage_all(scene, how.device, notes.append)
-    animation, aims, course = staged.animation, staged.aims, staged.course
-    check_memory(animation, kept_frames(scene.outputs), len(course.order) if course else None)
+    animation, aims, settings = staged.animation, staged.aims, staged.settings
+    check_memory(animation, kept_frames(scene.outputs), len(settings.order) if settings else None)
     writers = [] if how.preview or how.dry_run else open_writers(scene, animation)
 
     def note(text: str) -> None:
@@ -92,7 +92,7 @@ def run_scene(scene: Scene, how: Run) -> int:
     if how.save_scene and not searches:
         write_scene(how.save_scene, sized)
     if how.dry_run:
-        _say_plan(animation, scene.outputs, course)
+        _say_plan(animation, scene.outputs, settings)
         if aims:
             print(f"search    {len(aims.keyframes)} keyframes' forces first, for which time is not counted")
         return 0
@@ -101,8 +101,8 @@ def run_scene(scene: Scene, how: Run) -> int:
     if how.preview or not (scene.outputs or searches):
         return 0
     _load(animation, how.quiet)
-    match = _matched(animation, aims, how, FACTORS_OF_MORPH if course else None) if searches else None
-    morph = Morph(match, staged.pair, course) if match and course else None
+    match = _matched(animation, aims, how, FACTORS_OF_MORPH if settings else None) if searches else None
+    morph = Morph(match, staged.pair, settings) if match and settings else None
     if match:
         animation = match.animation
         if how.save_scene:
@@ -124,10 +124,10 @@ def run_scene(scene: Scene, how: Run) -> int:
     if not match:
         return 0
     folds = _judge_folds(min(least, match.jacobian[0]))
-    return _judge_match(match, aims.side, course) or folds
+    return _judge_match(match, aims.side, settings) or folds
 
 
-def _with_sizes(scene: Scene, picture: Picture, pair: Pair | None) -> Scene:
+def _with_sizes(scene: Scene, picture: Picture, pair: PicturePair | None) -> Scene:
     """The scene, saying what its pixels refer to."""
     tables = dict(scene.tables)
     tables["picture"] = {"size": [picture.width, picture.height], **tables["picture"]}
@@ -136,7 +136,7 @@ def _with_sizes(scene: Scene, picture: Picture, pair: Pair | None) -> Scene:
     return Scene(tables, scene.folder, scene.source, scene.lines, scene.flags)
 
 
-def _check_names(scene: Scene, how: Run) -> None:
+def _check_names(scene: Scene, how: RunOptions) -> None:
     """Refuse to write over what is read, or one file twice."""
     frames = scene.frame_count
     taken = {path.resolve(): "a picture that is read" for path in scene.files()}
@@ -152,7 +152,7 @@ def _check_names(scene: Scene, how: Run) -> None:
             written.append((Path(name), f"written by {flag}", 0))
     for path, what, start in written:
         check_folder(path)
-        for name in names(path, start, frames):
+        for name in files_written(path, start, frames):
             if name in taken:
                 raise ValueError(f"{name}: that is {taken[name]}; write to another name")
             taken[name] = what
@@ -164,7 +164,7 @@ def _check_names(scene: Scene, how: Run) -> None:
             raise ValueError(f"{path}: {flag} is written as {ending}")
 
 
-def _matched(animation: Animation, aims: Aims, how: Run, factors: Sequence[float] | None) -> Match:
+def _matched(animation: Animation, aims: Aims, how: RunOptions, factors: Sequence[float] | None) -> Match:
     """Find the forces of keyframes, saying how far the search is; Ctrl-C ends it with the best so far."""
     with HeldInterrupt() as interrupt, SearchProgress(aims.side, how.quiet) as show:
 
@@ -190,7 +190,7 @@ def _matched(animation: Animation, aims: Aims, how: Run, factors: Sequence[float
         return match
 
 
-def _judge_match(match: Match, side: float, course: Course | None) -> int:
+def _judge_match(match: Match, side: float, settings: MorphSettings | None) -> int:
     """Say which points are not where they should be; the exit code. All of a morph's are due at its end."""
     if match.status == REACHED:
         return 0
@@ -199,7 +199,7 @@ def _judge_match(match: Match, side: float, course: Course | None) -> int:
     print(f"wfluid: {match.status}: {text}", file=sys.stderr)
     for arrival in match.arrivals:
         if arrival.residual > match.tolerance:
-            print(f"wfluid: {arrival.said(side, timed=course is None)}", file=sys.stderr)
+            print(f"wfluid: {arrival.said(side, timed=settings is None)}", file=sys.stderr)
     return EXIT_INTERRUPTED if match.status == STOPPED else EXIT_FAILED
 
 
@@ -212,12 +212,12 @@ def _judge_folds(least: float) -> int:
     return EXIT_FAILED
 
 
-def _say_plan(animation: Animation, outputs: Sequence[Output], course: Course | None) -> None:
+def _say_plan(animation: Animation, outputs: Sequence[Output], settings: MorphSettings | None) -> None:
     """Print what a run would take and write."""
     timeline, grid = animation.timeline, animation.grid
-    morph_frames = len(course.order) if course else None
+    morph_frames = len(settings.order) if settings else None
     guess = estimate(animation, kept_frames(outputs), morph_frames)
-    frames, fps = morph_frames or animation.frame_count, course.timeline.fps if course else timeline.fps
+    frames, fps = morph_frames or animation.frame_count, settings.timeline.fps if settings else timeline.fps
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     size = animation.width or animation.picture.width, animation.height or animation.picture.height
     print(f"picture   {animation.picture.width} x {animation.picture.height} pixels")

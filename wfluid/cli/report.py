@@ -13,13 +13,13 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
 from wfluid.keyframes.match import Match
-from wfluid.model.force import Force, flat
+from wfluid.model.force import Force, flatten
 from wfluid.model.painted import Keyed, Painted, Quantity
 from wfluid.morphing.frame import MorphFrame
 from wfluid.morphing.morph import Morph
 from wfluid.pictures.formats import PictureError
 from wfluid.solve.system import Residual
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 
 @dataclass
@@ -157,7 +157,7 @@ class Report:
             return {}
         mean, most = morph.inconsistency_px()
         residuals = [float(value) for value in morph.residuals_of_b()]
-        window, course = morph.pair.window, morph.course
+        window, settings = morph.pair.window, morph.settings
         return {
             "morph": {
                 "to": list(morph.pair.size),
@@ -175,7 +175,7 @@ class Report:
                     "second": self.of_b,
                 },
                 "inconsistency_px": {"mean": mean, "max": most},
-                "blend": course.blend,
+                "blend": settings.blend,
                 "notes": [*morph.pair.said, *morph.said],
             }
         }
@@ -188,7 +188,7 @@ class Report:
             "picture": [animation.picture.width, animation.picture.height],
             "grid": [animation.grid.nx, animation.grid.ny],
             "frames": self.frames,
-            "fps": (self.morph.course if self.morph else animation).timeline.fps,
+            "fps": (self.morph.settings if self.morph else animation).timeline.fps,
             "steps": self._steps,
             "settings": {
                 "viscosity": _described(fluid.viscosity),
@@ -201,7 +201,7 @@ class Report:
                 "filter": animation.filter,
                 "edge": animation.edge,
                 "loop": animation.loop,
-                "forces": [_kind(force) for force in flat(animation.forces)],
+                "forces": [_kind(force) for force in flatten(animation.forces)],
                 "densities": list(fluid.density_names),
                 "layers": list(animation.layers),
             },
@@ -266,7 +266,7 @@ def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
     """
     path = Path(path)
     try:
-        with whole_file(path) as temporary:
+        with atomic_file(path) as temporary:
             temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise PictureError(f"{path}: cannot be written ({error.strerror})") from error

@@ -16,12 +16,12 @@ from wfluid.animation.frame import Frame
 from wfluid.cli.progress import FrameProgress
 from wfluid.cli.report import Report
 from wfluid.files.output import open_output
-from wfluid.files.tracks import Tracks
+from wfluid.files.tracks import TrackWriter
 from wfluid.morphing.morph import Morph
 from wfluid.pictures.picture import Picture
 from wfluid.scene.scene import Output, Scene
 from wfluid.system.interrupt import HeldInterrupt
-from wfluid.view.densities import stretched
+from wfluid.view.densities import upsample
 
 QUEUED_FRAMES = 4
 """Frames that may wait for the disk while the next ones are computed."""
@@ -47,7 +47,7 @@ def open_writers(scene: Scene, animation: Animation) -> list[tuple[_Writer, Call
         if output.of == "report":
             continue
         if output.of == "tracks":
-            tracks = Tracks(output.file, max(width, height))
+            tracks = TrackWriter(output.file, max(width, height))
             found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
             continue
         writer = open_output(output.file, scene.timeline.fps, output.start, output.encoding)
@@ -62,7 +62,7 @@ def _shown(frame: Frame, of: str) -> Picture:
     if of in frame.layers:
         return frame.layers[of]
     width, height = frame.picture.width, frame.picture.height
-    values = stretched(np.maximum(frame.densities[of], 0.0), width, height, frame.map.walls.periodic)
+    values = upsample(np.maximum(frame.densities[of], 0.0), width, height, frame.map.walls.periodic)
     return Picture(values[..., None], dtype="float", data=True)
 
 

@@ -21,7 +21,7 @@ from wfluid.domain.piecewise import finite, hats, smoothstep
 Slopes = dict[str, np.ndarray]
 """Derivatives by numbers: each under its number's attribute path, "factors[0].period", and in its shape."""
 
-_Numbers = TypeVar("_Numbers", float, np.ndarray)
+Scalars = TypeVar("_Numbers", float, np.ndarray)
 
 _NODES, _WEIGHTS = (tuple(float(x) for x in values) for values in np.polynomial.legendre.leggauss(5))
 
@@ -303,7 +303,7 @@ class Oscillator(Envelope):
         """Closed form, so right for periods shorter than a step too."""
         return self._between(self._primitive, start, end)
 
-    def _between(self, primitive: Callable[[float], _Numbers], start: float, end: float) -> _Numbers:
+    def _between(self, primitive: Callable[[float], Scalars], start: float, end: float) -> Scalars:
         """What a primitive gains over a step, half of it in the half period of half the amplitude."""
         a = max(start, self.start) - self.start
         b = max(a, min(end, self.end) - self.start)

@@ -69,11 +69,11 @@ class Walls:
         """Of the velocity's y component, on y-faces."""
         return _tangential(self.x), _normal(self.y, Rule.FACE)
 
-    def moved_x_rules(self) -> tuple[Rule, Rule]:
+    def displacement_x_rules(self) -> tuple[Rule, Rule]:
         """Of a displacement's x component at centres: it moves along walls as the velocity does."""
         return _normal(self.x, Rule.ODD), _tangential(self.y)
 
-    def moved_y_rules(self) -> tuple[Rule, Rule]:
+    def displacement_y_rules(self) -> tuple[Rule, Rule]:
         """Of a displacement's y component at centres."""
         return _tangential(self.x), _normal(self.y, Rule.ODD)
 

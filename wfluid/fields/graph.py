@@ -10,7 +10,7 @@ import warp as wp
 
 from wfluid.kernels.cell.program import strips
 from wfluid.kernels.cell.strips import GIVEN_UP, STRIP, Strip
-from wfluid.system.threads import Helpers
+from wfluid.system.threads import ThreadTeam
 
 LAUNCHES = threading.RLock()
 """Held by whatever calls Warp but for replays: a capture takes in what any thread allocates or launches."""
@@ -31,13 +31,13 @@ _PATIENCE = 10.0
 """How long an interrupted replay waits for its helpers to end [s]."""
 
 
-class Replay:
+class CapturedGraph:
     """The launches of `work`, captured once, replayed by several threads that share their rows.
 
     The calling thread is one of them, `pool`, which must have no other work, has the others.
     """
 
-    def __init__(self, device: wp.Device, work: Callable[[], None], pool: Helpers | None):
+    def __init__(self, device: wp.Device, work: Callable[[], None], pool: ThreadTeam | None):
         self._pool = pool
         self._strips = strips(pool.count + 1, device) if pool else [None]
         self._graphs = [_captured(device, work, strip) for strip in self._strips]

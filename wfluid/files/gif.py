@@ -9,7 +9,7 @@ import numpy as np
 from wfluid.files import movie
 from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture, display_rgb
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 LONGEST_DELAY = 65535
 """Longest GIF delay that its two bytes hold [1/100 s]."""
@@ -18,7 +18,7 @@ LEAST_DELAY = 2
 """Shortest GIF delay that browsers obey [1/100 s]."""
 
 
-class Gif:
+class GifWriter:
     """An animated GIF that loops for ever: PyAV writes it where installed, else OpenImageIO.
 
     GIF counts in hundredths of a second: the delays are spread so that their mean is 1 / fps.
@@ -40,7 +40,7 @@ class Gif:
         """Write the file, if there are frames."""
         if not self._frames:
             return
-        with whole_file(self.path) as temporary:
+        with atomic_file(self.path) as temporary:
             if movie.available():
                 movie.write_gif(temporary, self._frames)
             else:

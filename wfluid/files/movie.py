@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.pictures.picture import Picture, display_rgb
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 
-class MovieFile:
+class MovieWriter:
     """MP4 or WebM, encoded as the frames come."""
 
     def __init__(self, path: Path, fps: float):
@@ -26,7 +26,7 @@ class MovieFile:
         """Encode the next frame."""
         frame = display_rgb(picture)
         if self._movie is None:
-            temporary = self._stack.enter_context(whole_file(self.path))
+            temporary = self._stack.enter_context(atomic_file(self.path))
             self._movie = Movie(temporary, self.path.suffix.lower(), frame.shape[1], frame.shape[0], self.fps)
         self._movie.write(frame)
 

@@ -28,7 +28,7 @@ def check_folder(path: Path) -> None:
     remove_leftovers(path.parent)
 
 
-def names(path: Path, start: int, frames: int) -> set[Path]:
+def files_written(path: Path, start: int, frames: int) -> set[Path]:
     """Every file that an animation of so many frames writes under a name, resolved."""
     pattern = numbering(path)
     if pattern is None:

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Protocol
 
 from wfluid.files import movie
-from wfluid.files.gif import Gif
-from wfluid.files.movie import MovieFile
+from wfluid.files.gif import GifWriter
+from wfluid.files.movie import MovieWriter
 from wfluid.files.names import FIRST_FRAME, check_folder, numbering
 from wfluid.files.sequence import Sequence
 from wfluid.pictures.formats import Encoding, PictureError
 from wfluid.pictures.picture import Picture
 
 
-class Output(Protocol):
+class FrameWriter(Protocol):
     """Where frames go, in order; nothing is there under its final name before it is whole."""
 
     written: list[Path]
@@ -37,7 +37,7 @@ class Output(Protocol):
 
 def open_output(
     path: str | os.PathLike, fps: float, start: int = FIRST_FRAME, encoding: Encoding | None = None
-) -> Output:
+) -> FrameWriter:
     """The output for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
 
     `start` is the number of a sequence's first frame, `encoding` how its stills are written.
@@ -56,11 +56,11 @@ def open_output(
         return Sequence(path, numbered, start, encoding)
     ending = path.suffix.lower()
     if ending == ".gif":
-        return Gif(path, fps)
+        return GifWriter(path, fps)
     if ending in movie.CODECS:
         if not movie.available():
             raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
-        return MovieFile(path, fps)
+        return MovieWriter(path, fps)
     kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
     raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.pictures.formats import PictureError
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 
-class Tracks:
+class TrackWriter:
     """A CSV file with a row a frame and point: frame, time [s], point (from 0), x, y [px].
 
     Pixels are those of a frame whose longer side is `side`.
@@ -34,7 +34,7 @@ class Tracks:
     def close(self) -> None:
         """Write the file, if there are frames."""
         if self._rows:
-            with whole_file(self.path) as temporary:
+            with atomic_file(self.path) as temporary:
                 temporary.write_text("\n".join(["frame,time,point,x,y", *self._rows]) + "\n")
             self.written.append(self.path)
 

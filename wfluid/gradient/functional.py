@@ -25,17 +25,17 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.fields.state import State
-from wfluid.gradient.objectives import Effort, Objective, ParticleObjective, particles_of, terms_of, times_of
-from wfluid.gradient.recording import Recording, Reversed, Stretch
-from wfluid.gradient.state_objectives import StateObjective, Term
+from wfluid.gradient.objectives import Effort, Objective, ParticleObjective, points_of, terms_of, times_of
+from wfluid.gradient.recording import Recording, RunGradients, StepRange
+from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
 from wfluid.gradient.variables import VELOCITY, VISCOSITY, Free, Setup, Variables
 from wfluid.kernels.cell.real import Real
 from wfluid.model.densities import Source
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import BlobForce, Force, Group, flat
+from wfluid.model.force import Force, Group, LocalForce, flatten
 from wfluid.step.diffusion import SURE_TOLERANCE
-from wfluid.step.gaussians import blob_of
-from wfluid.step.step import Stages
+from wfluid.step.gaussians import gaussian_impulse_of
+from wfluid.step.step import Step
 
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Most that conjugate gradients may leave undone of a solve."""
@@ -46,7 +46,7 @@ ROUNDING = 1e-6
 
 
 @dataclass
-class Seconds:
+class EvaluationTimes:
     """Where the time of evaluations went [s]."""
 
     forward: float = 0.0
@@ -100,7 +100,7 @@ class Functional:
         velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
         if velocity.shape != shape or not np.all(np.isfinite(velocity)):
             raise ValueError(f"velocity of shape {velocity.shape}: expected finite numbers of shape {shape}")
-        setup = Setup(fluid, flat(forces), velocity)
+        setup = Setup(fluid, flatten(forces), velocity)
         self.grid, self.timeline, self.objective = grid, timeline, objective
         self.variables = Variables(setup, free, grid)
         self.start = self.variables.pack()
@@ -125,14 +125,14 @@ class Functional:
         if before and (before.stages.grid, before.timeline) == (grid, timeline):
             stages = before.stages
         else:
-            stages, before = Stages(grid, fluid, open_device(device), JUMP_TOLERANCE), None
+            stages, before = Step(grid, fluid, open_device(device), JUMP_TOLERANCE), None
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
-        terms: dict[int, list[Term]] = {}
+        terms: dict[int, list[DeviceObjective]] = {}
         # graphs count effort with weight 1, and so suit all weights: the others are relative to it
         self._scale = sum(weight for weight, term in terms_of(objective) if isinstance(term, Effort))
         effort, self._scale, count = bool(self._scale), self._scale or 1.0, 0
         for weight, term in terms_of(objective):
-            own = slice(count, count + len(particles_of(term)))
+            own = slice(count, count + len(points_of(term)))
             count, weight = own.stop, weight / self._scale
             steps = [self._step_of(t) for t in times_of(term)]
             if isinstance(term, ParticleObjective):
@@ -141,12 +141,12 @@ class Functional:
                 terms.setdefault(steps[0], []).append(term.term(stages, weight, own))
             elif not isinstance(term, Effort):
                 raise TypeError(f"{type(term).__name__} is no objective that a run has")
-        points = np.concatenate([np.empty((0, 2)), *(particles_of(term) for _, term in terms_of(objective))])
+        points = np.concatenate([np.empty((0, 2)), *(points_of(term) for _, term in terms_of(objective))])
         inside = np.clip(points, 0.0, (grid.width, grid.height))
         if not np.all(np.abs(points - inside) <= ROUNDING):
             raise ValueError("an objective's particles must begin within the picture")
         self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
-        stretch = Stretch(self._first, self._last, begun, inside)
+        stretch = StepRange(self._first, self._last, begun, inside)
         if before and not (terms or of_viscosity or memory_mb) and before.suits(setup, stretch, effort):
             before.moved(setup, stretch)
             self._recording = before
@@ -155,13 +155,13 @@ class Functional:
             self._recording = Recording(
                 stages, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
             )
-        self.evaluations, self.seconds = 0, Seconds()
+        self.evaluations, self.seconds = 0, EvaluationTimes()
 
     start: np.ndarray
     """The free numbers of the fluid and forces given, as a vector."""
     evaluations: int
     """How often a value has been asked for."""
-    seconds: Seconds
+    seconds: EvaluationTimes
     """Where the time of evaluations went."""
 
     @property
@@ -247,7 +247,7 @@ class Functional:
             t = self._recording.time_of(step)
             raise FloatingPointError(f"the gradient is not finite from step {step} ({t:.4g} s) backward")
 
-    def _gradients(self, found: Reversed) -> dict[str, np.ndarray]:
+    def _gradients(self, found: RunGradients) -> dict[str, np.ndarray]:
         """Gradients by name."""
         gradients = {VELOCITY: found.velocity, VISCOSITY: found.viscosity}
         if isinstance(self._setup.fluid.viscosity, float):
@@ -269,7 +269,7 @@ class Functional:
                 start, end = self._recording.time_of(step), self._recording.time_of(step + 1)
                 if not np.any(row):
                     continue
-                bar = blob_of(row) if isinstance(force, BlobForce | Source) else row
+                bar = gaussian_impulse_of(row) if isinstance(force, LocalForce | Source) else row
                 for key, slope in force.pull_back(start, end, bar).items():
                     gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
 

@@ -60,7 +60,7 @@ class Sum(Objective):
                 raise ValueError(f"an objective's weight is {weight}: expected a finite number")
 
 
-def particles_of(objective: Objective) -> np.ndarray:
+def points_of(objective: Objective) -> np.ndarray:
     """Where the particles begin that an objective looks at [longer side], (n, 2)."""
     return getattr(objective, "points", np.empty((0, 2)))
 

@@ -10,7 +10,7 @@ import warp as wp
 from wfluid.fields.arrays import field, from_numpy
 from wfluid.fields.graph import exclusive
 from wfluid.fields.state import State
-from wfluid.gradient.state_objectives import StateObjective, Term
+from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
 from wfluid.kernels.adjoint import misfit
 from wfluid.kernels.cell.layout import HALO, Layout
 from wfluid.kernels.cell.real import Real
@@ -18,7 +18,7 @@ from wfluid.kernels.view.lookup import Pixel
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.sampling import check_look_up
-from wfluid.step.step import Stages
+from wfluid.step.step import Step
 from wfluid.view.lookup import QUAD, LookUp, quads_of
 from wfluid.view.lookup_adjoint import ADJOINTS, LookUpAdjoint
 
@@ -73,16 +73,16 @@ class PictureMisfit(StateObjective):
                 + (", its alpha for the transparent edge included" if gains else "")
             )
 
-    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device, for the grid and walls of `stages`."""
         return _PictureTerm(self, stages, weight)
 
 
-class _PictureTerm(Term):
+class _PictureTerm(DeviceObjective):
     """Half the weighted squares of the pixels shown less those wanted."""
 
     @exclusive
-    def __init__(self, misfit: PictureMisfit, stages: Stages, weight: float):
+    def __init__(self, misfit: PictureMisfit, stages: Step, weight: float):
         width, height, grid = misfit.target.width, misfit.target.height, stages.grid
         self.device, self.layout = stages.device, Layout(width, height)
         self._look_up = LookUp(

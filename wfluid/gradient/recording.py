@@ -22,18 +22,18 @@ import warp as wp
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.arrays import from_numpy, to_numpy
 from wfluid.fields.device import load_kernels
-from wfluid.fields.graph import Replay, exclusive
+from wfluid.fields.graph import CapturedGraph, exclusive
 from wfluid.fields.state import State
 from wfluid.gradient.checkpoints import Advance, Restore, Reverse, Schedule, Store, even_segments, least_room
-from wfluid.gradient.state_objectives import Term
-from wfluid.gradient.step_tables import Counter, Table
+from wfluid.gradient.state_objectives import DeviceObjective
+from wfluid.gradient.step_tables import StepCounter, StepTable
 from wfluid.gradient.variables import Setup
 from wfluid.kernels.adjoint import misfit
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import STRIP, repeat_while
 from wfluid.step.adjoint import StepAdjoint
-from wfluid.step.forcing import Impulses
-from wfluid.step.step import Stages
+from wfluid.step.forcing import Forcing
+from wfluid.step.step import Step
 
 MEGABYTE = 2**20
 
@@ -42,7 +42,7 @@ WORKING_STATES = 4
 
 
 @dataclass(frozen=True)
-class Reversed:
+class RunGradients:
     """The gradients that going back through a run found."""
 
     velocity: np.ndarray
@@ -50,13 +50,13 @@ class Reversed:
     viscosity: np.ndarray
     """With respect to the viscosity at centres, (ny, nx); 0 unless it was asked for."""
     forces: Mapping[int, np.ndarray]
-    """With respect to what each force does in every step (`Impulses.gradients`)."""
+    """With respect to what each force does in every step (`Forcing.gradients`)."""
     sources: list[Mapping[int, np.ndarray]]
     """The same for the sources of each density."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class StepRange:
     """Steps of a timeline that are run."""
 
     first: int
@@ -72,7 +72,7 @@ class Stretch:
 class Recording:
     """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
 
-    It runs over a `Stretch` of the timeline. `terms` are objectives of the state after some steps. With
+    It runs over a `StepRange` of the timeline. `terms` are objectives of the state after some steps. With
     `effort` half the squares of what forces add count too. With `room` for more steps than it has it can be
     `moved` to other stretches.
 
@@ -83,11 +83,11 @@ class Recording:
     @exclusive
     def __init__(
         self,
-        stages: Stages,
+        stages: Step,
         setup: Setup,
         timeline: Timeline,
-        stretch: Stretch,
-        terms: Mapping[int, Sequence[Term]],
+        stretch: StepRange,
+        terms: Mapping[int, Sequence[DeviceObjective]],
         memory_mb: float | None = None,
         of_viscosity: bool = False,
         effort: bool = False,
@@ -95,7 +95,7 @@ class Recording:
     ):
         self.stages, self.timeline, self.device = stages, timeline, stages.device
         self._stretch, self._terms = stretch, terms
-        self._term_replays: dict[Callable, Replay] = {}
+        self._term_replays: dict[Callable, CapturedGraph] = {}
         grid, device = stages.grid, stages.device
         self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
         load_kernels(device)
@@ -113,19 +113,19 @@ class Recording:
         rows = max(self.steps, room) if self.schedule.keeps_all else longest
         stored = 0 if self.schedule.keeps_all else len(self.schedule.segments)
         self.room = rows
-        self._states = [Table(a, rows + 1) for a in self._kept(self._before)]
-        self._stored = [Table(a, stored) for a in self._kept(self._before)]
-        self._impulses = Impulses(setup.forces, setup.fluid, grid, device, gradients=True)
+        self._states = [StepTable(a, rows + 1) for a in self._kept(self._before)]
+        self._stored = [StepTable(a, stored) for a in self._kept(self._before)]
+        self._impulses = Forcing(setup.forces, setup.fluid, grid, device, gradients=True)
         self._numbers, self._boxes, self._bars = (
-            Table(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
+            StepTable(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
         )
-        self._pulls = [Table(p, rows + 1) for p in self._before.particles]
+        self._pulls = [StepTable(p, rows + 1) for p in self._before.particles]
         changes = stages.medium and stages.medium.changes
-        self._viscosities = Table(stages.medium.painted_mu, rows) if changes else None
+        self._viscosities = StepTable(stages.medium.painted_mu, rows) if changes else None
         self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
-        self._square_rows = Table(self._squares, rows)
-        self._counter, self._pool = Counter(device), stages.helpers(alone=True)
-        self._preparation: Replay | None = None
+        self._square_rows = StepTable(self._squares, rows)
+        self._counter, self._pool = StepCounter(device), stages.helpers(alone=True)
+        self._preparation: CapturedGraph | None = None
         self._tapes: dict[int, wp.Tape] = {}
         self._plan: tuple = ()
         self.set(setup)
@@ -140,7 +140,7 @@ class Recording:
         """How many steps it has."""
         return self._stretch.last - self._stretch.first
 
-    def moved(self, setup: Setup, stretch: Stretch) -> None:
+    def moved(self, setup: Setup, stretch: StepRange) -> None:
         """Run over another stretch, for which there is room, with as many points, and with another setup.
 
         Raises:
@@ -150,7 +150,7 @@ class Recording:
         self.schedule = self._planned(None)
         self.set(setup)
 
-    def suits(self, setup: Setup, stretch: Stretch, effort: bool) -> bool:
+    def suits(self, setup: Setup, stretch: StepRange, effort: bool) -> bool:
         """Whether it may be `moved` to a stretch and a setup of the same fluid."""
         return (
             self.schedule.keeps_all
@@ -159,7 +159,7 @@ class Recording:
             and stretch.last - stretch.first <= self.room
             and len(stretch.points) == len(self._stretch.points)
             and setup.fluid is self.stages.fluid
-            and Impulses.key(setup.forces) == Impulses.key(self._setup.forces)
+            and Forcing.key(setup.forces) == Forcing.key(self._setup.forces)
         )
 
     def _kept(self, state: State) -> list[wp.array]:
@@ -219,13 +219,13 @@ class Recording:
             plan = stages.plan(self.time_of(1), dt, self._prepare)
         if plan != self._plan:
             self._plan = ()  # should the captures be interrupted
-            forward = Replay(self.device, self._record, self._pool)
-            backward = Replay(self.device, self._play_back, self._pool)
+            forward = CapturedGraph(self.device, self._record, self._pool)
+            backward = CapturedGraph(self.device, self._play_back, self._pool)
             self._forward, self._backward, self._plan = forward, backward, plan
 
     def _prepare(self) -> None:
         if self._preparation is None:
-            self._preparation = Replay(self.device, self.stages.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self.stages.follow_medium, self._pool)
         self._preparation.launch()
 
     def _record(self) -> None:
@@ -344,7 +344,7 @@ class Recording:
 
     def backward(
         self, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None = None
-    ) -> Reversed:
+    ) -> RunGradients:
         """Go back through the last `forward`.
 
         `pulls` are gradients (n, 2) with respect to the particles' places [longer side] after some steps.
@@ -362,7 +362,7 @@ class Recording:
         layout, numbers = self.stages.layout, self._all_numbers
         velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
         self._adjoint.fold_viscosity()
-        return Reversed(
+        return RunGradients(
             np.stack(velocity),
             to_numpy(self._adjoint.mu_bar, layout).astype(np.float64),
             self._impulses.gradients(numbers, bars),
@@ -402,11 +402,11 @@ class Recording:
             self._step_back()
             watch(start + n, self._bar)
 
-    def _replay(self, term: Term, work: Callable) -> Replay:
+    def _replay(self, term: DeviceObjective, work: Callable) -> CapturedGraph:
         """Launches of a term, captured when first used."""
         if work not in self._term_replays:
             arguments = [self._end, self._after_bar] if work == term.adjoint else [self._end]
-            self._term_replays[work] = Replay(self.device, partial(work, *arguments), None)
+            self._term_replays[work] = CapturedGraph(self.device, partial(work, *arguments), None)
         return self._term_replays[work]
 
     def _base(self, start: int) -> int:

@@ -18,7 +18,7 @@ from wfluid.kernels.adjoint import transport as transport_adjoint
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import sums
 from wfluid.model.painted import Painted
-from wfluid.step.step import Stages
+from wfluid.step.step import Step
 
 
 class StateObjective(Objective):
@@ -33,11 +33,11 @@ class StateObjective(Objective):
         return (self.time,)
 
     @abstractmethod
-    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
         """It on the device, for the grid and fluid of `stages`; `particles` are its own of the state's."""
 
 
-class Term(ABC):
+class DeviceObjective(ABC):
     """An objective of the fluid at one time, on the device, times its weight."""
 
     @abstractmethod
@@ -70,7 +70,7 @@ class MapMisfit(StateObjective):
     weight: Painted | None = None
     """Where it counts: a factor painted over the picture."""
 
-    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device, where displacements are in cells."""
         grid = stages.grid
         scales = (grid.hx, grid.hy)
@@ -97,7 +97,7 @@ class DensityMisfit(StateObjective):
     weight: Painted | None = None
     """Where it counts: a factor painted over the picture."""
 
-    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device."""
         grid, names = stages.grid, stages.fluid.density_names
         if self.density not in names:
@@ -108,12 +108,12 @@ class DensityMisfit(StateObjective):
         return _FieldMisfit(stages, (names.index(self.density),), [target], squares, self.weight)
 
 
-class _FieldMisfit(Term):
+class _FieldMisfit(DeviceObjective):
     """Half the weighted squares of fields at centres less what they should be."""
 
     def __init__(
         self,
-        stages: Stages,
+        stages: Step,
         names: Sequence[str | int],
         targets: Sequence[np.ndarray],
         squares: Sequence[float],
@@ -124,7 +124,7 @@ class _FieldMisfit(Term):
         self._targets, self._weights, self._left, self._weighted = (
             vector(self.layout, self.device, fields) for _ in range(4)
         )
-        painted = np.ones((grid.ny, grid.nx)) if paint is None else paint.on(grid)
+        painted = np.ones((grid.ny, grid.nx)) if paint is None else paint.sample(grid)
         for n, (target, square) in enumerate(zip(targets, squares, strict=True)):
             from_numpy(target, self._targets[n], self.layout)
             from_numpy(square * painted, self._weights[n], self.layout)
@@ -188,12 +188,12 @@ class WarpObjective(StateObjective):
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))
 
-    def term(self, stages: Stages, weight: float, particles: slice) -> Term:
+    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device."""
         return _Program(self.program, weight, particles, stages.device)
 
 
-class _Program(Term):
+class _Program(DeviceObjective):
     """A user's launches, on a tape of their own."""
 
     def __init__(

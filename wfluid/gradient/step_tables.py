@@ -12,7 +12,7 @@ CHUNK = 1024
 """Entries that a line copies on a CPU; on CUDA one."""
 
 
-class Counter:
+class StepCounter:
     """The row that a captured loop is at, and where it ends."""
 
     def __init__(self, device: wp.Device):
@@ -30,7 +30,7 @@ class Counter:
         step_table.count.launch(1, self.device, [by], [self.step, self.going])
 
 
-class Table:
+class StepTable:
     """So many rows like an array."""
 
     def __init__(self, like: wp.array, count: int):
@@ -40,12 +40,12 @@ class Table:
         self._lines = -(-self.size // self._chunk)
         self._take = step_table.take_indices if like.dtype is wp.int32 else step_table.take
 
-    def take(self, counter: Counter, out: wp.array, ahead: int = 0) -> None:
+    def take(self, counter: StepCounter, out: wp.array, ahead: int = 0) -> None:
         """Out = the row that is `ahead` of the counter's: launches only."""
         inputs = [self.array, counter.step, ahead, self.size, self._chunk]
         self._take.launch(self._lines, self.device, inputs, [out])
 
-    def give(self, counter: Counter, f: wp.array, ahead: int = 0) -> None:
+    def give(self, counter: StepCounter, f: wp.array, ahead: int = 0) -> None:
         """The row that is `ahead` of the counter's = f: launches only."""
         inputs = [f, counter.step, ahead, self.size, self._chunk]
         step_table.give.launch(self._lines, self.device, inputs, [self.array])
@@ -54,7 +54,7 @@ class Table:
         """Out = f, both as long as a row: launches only."""
         step_table.copied.launch(self._lines, self.device, [f, self.size, self._chunk], [out])
 
-    def add_to(self, counter: Counter, out: wp.array, ahead: int = 0) -> None:
+    def add_to(self, counter: StepCounter, out: wp.array, ahead: int = 0) -> None:
         """Add the row that is `ahead` of the counter's to `out`: launches only."""
         step_table.add_row.launch(self.size, self.device, [self.array, counter.step, ahead, self.size], [out])
 

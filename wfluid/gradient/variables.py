@@ -13,7 +13,7 @@ import numpy as np
 from wfluid.domain.grid import Grid
 from wfluid.model.densities import PaintedSource
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import Blob, FieldForce, Force
+from wfluid.model.force import FieldForce, Force, GaussianImpulse
 from wfluid.model.painted import Painted
 from wfluid.model.uniform_forces import Buoyancy
 
@@ -151,7 +151,7 @@ class Variables:
 
     def _get(self, name: str, setup: Setup | None = None) -> np.ndarray:
         value = (setup or self.setup).number(name)
-        return np.array(value.on(self.grid) if isinstance(value, Painted) else value, dtype=np.float64)
+        return np.array(value.sample(self.grid) if isinstance(value, Painted) else value, dtype=np.float64)
 
     def pack(self, setup: Setup | None = None) -> np.ndarray:
         """The vector of a setup, which differs from the first in free numbers only; by default of that."""
@@ -204,7 +204,7 @@ def _slopes_of(what: Any) -> list[str]:
         return list(what.pull_back(0.0, 1.0, [0.0] * len(what.integrals(0.0, 1.0))))
     if isinstance(what, Buoyancy):
         return list(what.pull_back(0.0, 1.0, (0.0, 0.0)))
-    return list(what.pull_back(0.0, 1.0, Blob((0.0, 0.0), 0.0)))
+    return list(what.pull_back(0.0, 1.0, GaussianImpulse((0.0, 0.0), 0.0)))
 
 
 def _path(name: str) -> list[str | int]:

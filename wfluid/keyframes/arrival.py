@@ -76,7 +76,7 @@ def reason_unreached(arrival: Arrival, arrivals: Sequence[Arrival], animation: A
             return "it lies on a wall, along which the fluid can slide but not leave it"
         if far[n] and not near[n]:
             return "its destination lies on a wall, which nothing from within reaches"
-    if fluid.freeze is not None and fluid.freeze.paint.on(grid)[_cell(point, grid)] > FROZEN:
+    if fluid.freeze is not None and fluid.freeze.paint.sample(grid)[_cell(point, grid)] > FROZEN:
         return "it lies where the picture is frozen"
     for other in arrivals:
         same = other.keyframe.time == arrival.keyframe.time and other is not arrival

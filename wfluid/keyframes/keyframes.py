@@ -48,7 +48,7 @@ class ParticleKeyframe:
 
 
 @dataclass(frozen=True, eq=False)
-class Particle:
+class PointTarget:
     """A point with its keyframes in their order."""
 
     point: Place
@@ -63,13 +63,13 @@ class Particle:
     """Whether it should stay in its place all the time."""
 
 
-def particles_of(
+def targets_of(
     keyframes: Sequence[ParticleKeyframe],
     pins: Sequence[Place],
     extent: tuple[float, float],
     end: float,
     side: float = 1.0,
-) -> list[Particle]:
+) -> list[PointTarget]:
     """The points of keyframes, and pins, which stay until the last keyframe.
 
     `side` is the longer side in the unit that refusals should speak of.
@@ -98,7 +98,7 @@ def particles_of(
     _refuse_meetings(found, pins, side)
     times = tuple(sorted({keyframe.time for keyframe in keyframes}))
     weights = (1.0,) * len(times)
-    found += [Particle(pin, times, np.tile(pin, (len(times), 1)), weights, True) for pin in pins]
+    found += [PointTarget(pin, times, np.tile(pin, (len(times), 1)), weights, True) for pin in pins]
     return found
 
 
@@ -113,7 +113,7 @@ def _known(place: Place, moved: dict[Place, list[ParticleKeyframe]]) -> Place:
     return next((other for other in moved if math.dist(place, other) < COINCIDENT), place)
 
 
-def _particle(point: Place, own: Sequence[ParticleKeyframe], side: float) -> Particle:
+def _particle(point: Place, own: Sequence[ParticleKeyframe], side: float) -> PointTarget:
     own = sorted(own, key=lambda keyframe: keyframe.time)
     for one, other in pairwise(own):
         if one.time == other.time:
@@ -123,7 +123,7 @@ def _particle(point: Place, own: Sequence[ParticleKeyframe], side: float) -> Par
                 + ("the same keyframe twice" if same else "two destinations")
                 + f" at {one.time:g} s"
             )
-    return Particle(
+    return PointTarget(
         point,
         tuple(keyframe.time for keyframe in own),
         np.array([keyframe.destination for keyframe in own]),
@@ -131,7 +131,7 @@ def _particle(point: Place, own: Sequence[ParticleKeyframe], side: float) -> Par
     )
 
 
-def _refuse_meetings(found: Sequence[Particle], pins: Sequence[Place], side: float) -> None:
+def _refuse_meetings(found: Sequence[PointTarget], pins: Sequence[Place], side: float) -> None:
     """No flow brings two points to one place."""
     for one, other in combinations(found, 2):
         for n, time in enumerate(one.times):

@@ -25,11 +25,21 @@ from wfluid.domain.timeline import Timeline
 from wfluid.gradient.functional import Functional
 from wfluid.gradient.variables import Free
 from wfluid.keyframes.arrival import Arrival, reason_unreached
-from wfluid.keyframes.keyframes import TOLERANCE, Particle, ParticleKeyframe, particles_of
-from wfluid.keyframes.search import COARSE, FINE, Level, Log, Progress, Scene, Search, Span, Stopped
-from wfluid.keyframes.ways import edges_of, forces_along, radii_of, ways_of
+from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, PointTarget, targets_of
+from wfluid.keyframes.search import (
+    COARSE,
+    FINE,
+    GridStart,
+    Problem,
+    Progress,
+    Search,
+    SearchLog,
+    Stopped,
+    TimeSpan,
+)
+from wfluid.keyframes.ways import forces_along, plan_ways, radii_of, window_edges
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import Force, flat
+from wfluid.model.force import Force, flatten
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.step.diffusion import SURE_TOLERANCE
 from wfluid.step.solver import Solver
@@ -116,7 +126,7 @@ def match_keyframes(
     same input and seed give the same bits on a CPU.
 
     Raises:
-        ValueError: keyframes that contradict, see `particles_of`; one that falls between two steps; an
+        ValueError: keyframes that contradict, see `targets_of`; one that falls between two steps; an
             animation that loops; a tolerance that is not positive.
     """
     began = time.perf_counter()
@@ -127,10 +137,10 @@ def match_keyframes(
     animation = replace(animation, fluid=_solved_surely(animation.fluid))
     grid, timeline = animation.grid, animation.timeline
     keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
-    particles = particles_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
+    particles = targets_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
     for t in sorted({t for particle in particles for t in particle.times}):
         _check_step(t, timeline)
-    log = Log(progress)
+    log = SearchLog(progress)
     best: Match | None = None
     factors = FACTORS if factors is None else factors
     tries = [(factors[0], tuple(start))] if free or start else []
@@ -158,7 +168,7 @@ def match_keyframes(
     )
 
 
-def _seconds(log: Log, began: float) -> dict[str, float]:
+def _seconds(log: SearchLog, began: float) -> dict[str, float]:
     """Where the time went since then."""
     total, spent = time.perf_counter() - began, log.seconds
     return {
@@ -169,7 +179,7 @@ def _seconds(log: Log, began: float) -> dict[str, float]:
     }
 
 
-def _all_stay(particles: Sequence[Particle]) -> bool:
+def _all_stay(particles: Sequence[PointTarget]) -> bool:
     """Whether every point should stay where it is."""
     return all(np.all(particle.destinations == particle.point) for particle in particles)
 
@@ -204,22 +214,22 @@ class _Matcher:
     def __init__(
         self,
         animation: Animation,
-        particles: Sequence[Particle],
+        particles: Sequence[PointTarget],
         free: Sequence[Free],
         start: tuple[GaussianForce, ...],
         tolerance: float,
         seed: int,
         factor: float,
-        log: Log,
+        log: SearchLog,
         captured: dict[Grid, Functional],
     ):
         self.animation, self.particles, self.tolerance = animation, particles, tolerance
         self._free, self._start, self._log, self._captured = free, start, log, captured
         grid = animation.grid
-        self.ways = ways_of(particles, (grid.width, grid.height), seed)
+        self.ways = plan_ways(particles, (grid.width, grid.height), seed)
         self._radii = radii_of(self.ways, factor)
-        self._edges = edges_of(self.ways, self._radii, animation.timeline)
-        self.given: tuple[Force, ...] = flat(animation.forces)
+        self._edges = window_edges(self.ways, self._radii, animation.timeline)
+        self.given: tuple[Force, ...] = flatten(animation.forces)
         self._searches: list[Search] = []
 
     @property
@@ -239,8 +249,8 @@ class _Matcher:
         points = np.array([particle.point for particle in self.particles])
         cells = min(self.animation.cells, max(COARSE_CELLS, math.ceil(CELLS_A_RADIUS / least)))
         picture = self.animation.picture
-        coarse = Level(Grid.for_picture(picture.width, picture.height, cells), None, points)
-        fine = Level(self.animation.grid, None, points)
+        coarse = GridStart(Grid.for_picture(picture.width, picture.height, cells), None, points)
+        fine = GridStart(self.animation.grid, None, points)
         for edges in self._spans():
             coarse, fine = self._search(edges, coarse, fine)
 
@@ -257,10 +267,10 @@ class _Matcher:
         cuts.append(stops[-1])
         return [[e for e in self._edges if a <= e <= b] for a, b in pairwise(cuts)]
 
-    def _search(self, edges: list[int], coarse: Level, fine: Level) -> tuple[Level, Level]:
+    def _search(self, edges: list[int], coarse: GridStart, fine: GridStart) -> tuple[GridStart, GridStart]:
         """Search one span; both levels at its end."""
         animation = self.animation
-        scene = Scene(
+        scene = Problem(
             animation.fluid, self.given, self._free, animation.timeline, animation.device, self._captured
         )
         span = self._span(edges, coarse, scene)
@@ -278,7 +288,7 @@ class _Matcher:
         last = edges[-1] == self._edges[-1]
         return (coarse, fine) if last else (search.after(coarse), search.after(fine))
 
-    def _span(self, edges: list[int], level: Level, scene: Scene) -> Span:
+    def _span(self, edges: list[int], level: GridStart, scene: Problem) -> TimeSpan:
         """The forces to begin with: those from before, and for points that these do not bring home."""
         forces, windows, owners = list(self._start), [-1] * len(self._start), []
         owners += range(len(self.ways), len(self.ways) + len(self._start))  # chains of their own
@@ -291,9 +301,9 @@ class _Matcher:
                     windows.append(window)
                     forces.append(force)
                     owners.append(n)
-        return Span(self.ways, edges, forces, windows, owners, guided)
+        return TimeSpan(self.ways, edges, forces, windows, owners, guided)
 
-    def _missing(self, level: Level, scene: Scene) -> list[bool]:
+    def _missing(self, level: GridStart, scene: Problem) -> list[bool]:
         """Which points the forces from before do not bring home."""
         solver = Solver(level.grid, scene.fluid, self.animation.solver.device)
         tracks = _tracks(solver, scene.timeline, (*scene.given, *self._start), level.points)[0]
@@ -304,20 +314,20 @@ class _Matcher:
             missing.append(bool(left.max() > 4 * self.tolerance))
         return missing
 
-    def _aim_for_the_picture(self, search: Search, level: Level) -> None:
+    def _aim_for_the_picture(self, search: Search, level: GridStart) -> None:
         """Where the picture misses by more than is good enough though its particle is there, go half way.
 
         Particle and map follow one flow by different interpolations; what lies between them is the
         grid's, and an aim in the middle leaves half of it to each.
         """
         dt, time_of = self.animation.timeline.dt, self.animation.timeline.time_of
-        shifts: dict[float, np.ndarray] = {}
+        corrections: dict[float, np.ndarray] = {}
         for _ in range(AIMED):
             missed = 0.0
             for step in search.keyed_steps:
                 state = search.after(level, step).begin[1]
                 warp = CoordinateMap.of_state(state, self.animation.fluid.walls)
-                by = shifts.setdefault(time_of(step), np.zeros((len(self.particles), 2)))
+                by = corrections.setdefault(time_of(step), np.zeros((len(self.particles), 2)))
                 for n, particle in enumerate(self.particles):
                     steps = [round(t / dt) for t in particle.times]
                     if step in steps:
@@ -327,7 +337,7 @@ class _Matcher:
                         by[n] += 0.5 * np.linalg.solve(_slope(warp, place), left)
             if missed <= self.tolerance:
                 return
-            search.settle(FINE, level, shifts=shifts)
+            search.settle(FINE, level, corrections=corrections)
 
 
 def _slope(warp: CoordinateMap, place: np.ndarray) -> np.ndarray:
@@ -356,7 +366,7 @@ def _tracks(
     return np.stack(tracks), found, (least, greatest)
 
 
-def _measured(matcher: _Matcher, stopped: bool, log: Log, began: float) -> Match:
+def _measured(matcher: _Matcher, stopped: bool, log: SearchLog, began: float) -> Match:
     """Run the animation and see where its points are."""
     animation, particles = matcher.animation, matcher.particles
     given, found = matcher.given, matcher.found

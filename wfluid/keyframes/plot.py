@@ -27,7 +27,7 @@ from wfluid.keyframes.match import Match
 from wfluid.keyframes.search import COARSE, FINE, MARCH
 from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture, encode
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -105,7 +105,7 @@ def plot_match(match: Match, path: str | os.PathLike) -> None:
     with _styled():
         figure = figure_of(match)
         try:
-            with whole_file(path) as temporary:
+            with atomic_file(path) as temporary:
                 figure.savefig(temporary, format=ending[1:], dpi=_DPI, metadata=_UNDATED[ending])
         except OSError as error:
             raise PictureError(f"{path}: cannot be written ({error.strerror})") from error

@@ -24,16 +24,15 @@ import numpy as np
 from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.state import State
-from wfluid.gradient.functional import Functional, Seconds
+from wfluid.gradient.functional import EvaluationTimes, Functional
 from wfluid.gradient.objectives import Effort
 from wfluid.gradient.variables import Free
-from wfluid.keyframes.way_misfit import NOTHING, Journey
+from wfluid.keyframes.way_misfit import NOTHING, WayMisfit
 from wfluid.keyframes.ways import Way
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import GaussianForce
-from wfluid.optimize.lbfgs import Settings, minimise
-from wfluid.optimize.lbfgs import State as Iterate
+from wfluid.optimize.lbfgs import Iterate, Settings, minimise
 
 MARCH, COARSE, FINE = "march", "coarse", "fine"
 """Stages of a search."""
@@ -87,7 +86,7 @@ class Stopped(Exception):
 
 
 @dataclass
-class Log:
+class SearchLog:
     """What a search has done."""
 
     heed: Callable[[Progress], object] = lambda progress: None
@@ -96,12 +95,12 @@ class Log:
     """Every iteration."""
     evaluations: int = 0
     """Runs with their gradients."""
-    seconds: Seconds = field(default_factory=Seconds)
+    seconds: EvaluationTimes = field(default_factory=EvaluationTimes)
     """Where their time went."""
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
+class TimeSpan:
     """A stretch of time between keyframes, with forces of its own."""
 
     ways: Sequence[Way]
@@ -119,7 +118,7 @@ class Span:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Problem:
     """What moves beside the forces that are sought."""
 
     fluid: Fluid
@@ -137,7 +136,7 @@ class Scene:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class GridStart:
     """A grid, and the fluid on it at the beginning of a span."""
 
     grid: Grid
@@ -154,7 +153,7 @@ class Search:
     It holds the best forces so far in `given` and `forces`, whatever ends it.
     """
 
-    def __init__(self, scene: Scene, span: Span, tolerance: float, log: Log):
+    def __init__(self, scene: Problem, span: TimeSpan, tolerance: float, log: SearchLog):
         self._scene, self._span, self._tolerance, self._log = scene, span, tolerance, log
         self.given, self.forces = tuple(scene.given), tuple(span.forces)
         self._time_of = scene.timeline.time_of
@@ -179,7 +178,7 @@ class Search:
         window = force.envelope.end - force.envelope.start
         return 2 * force.radius / window**2
 
-    def march(self, level: Level) -> None:
+    def march(self, level: GridStart) -> None:
         """Find forces that keep the points on their ways, window by window."""
         edges, windows = self._span.edges, self._span.windows
         for first in range(len(edges) - 1):
@@ -192,16 +191,18 @@ class Search:
             if first + 2 < len(edges):
                 level = self.after(level, edges[first + 1])
 
-    def settle(self, stage: str, level: Level, shifts: Mapping[float, np.ndarray] = NOTHING) -> float:
+    def settle(
+        self, stage: str, level: GridStart, corrections: Mapping[float, np.ndarray] = NOTHING
+    ) -> float:
         """Minimise over all windows; the longest misfit of a keyframe [longer side].
 
-        While keyframes are missed, what they are missed by is added to what is aimed at: the method of
-        multipliers (Nocedal & Wright, 17.3). Where that does not halve it the weight is lowered too. `shifts`
-        move the places of keyframes by time, (n, 2) [longer side].
+        While keyframes are missed, the miss is added to the aim: the method of multipliers (Nocedal & Wright,
+        17.3). Where that does not halve it, the weight is lowered too. `corrections` move the places of
+        keyframes by time, (n, 2) [longer side].
         """
         edges, before = self._span.edges, math.inf
         for _ in range(ROUNDS[stage]):
-            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), shifts)
+            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), corrections)
             if worst <= NEAR_ENOUGH * self._tolerance:
                 break
             lower = 1.0 if worst < 0.5 * before else LOWER
@@ -212,13 +213,13 @@ class Search:
                 self._lures[t] = (self._lures.get(t, 0.0) - by) * lower
         return worst
 
-    def after(self, level: Level, step: int | None = None) -> Level:
+    def after(self, level: GridStart, step: int | None = None) -> GridStart:
         """The level at the end of the span, or at a step."""
         step = self._span.edges[-1] if step is None else step
-        journey = Journey(self._span.ways, level.points, [self._time_of(step)], self._unit)
+        journey = WayMisfit(self._span.ways, level.points, [self._time_of(step)], self._unit)
         functional = self._functional(level, step, journey, self._all_free(), self._weight)
         state = functional.state_after(functional.start)
-        return Level(level.grid, (self._time_of(step), state), state.points)
+        return GridStart(level.grid, (self._time_of(step), state), state.points)
 
     @property
     def keyed_steps(self) -> list[int]:
@@ -237,7 +238,7 @@ class Search:
         return found
 
     def _functional(
-        self, level: Level, last: int, journey: Journey, free: Sequence[Free], weight: float
+        self, level: GridStart, last: int, journey: WayMisfit, free: Sequence[Free], weight: float
     ) -> Functional:
         scene, edges = self._scene, self._span.edges
         functional = Functional(
@@ -265,17 +266,17 @@ class Search:
     def _minimise(
         self,
         stage: str,
-        level: Level,
+        level: GridStart,
         steps: tuple[int, int],
         free: Sequence[Free],
-        shifts: Mapping[float, np.ndarray] = NOTHING,
+        corrections: Mapping[float, np.ndarray] = NOTHING,
     ) -> tuple[float, Mapping[float, np.ndarray]]:
         """Minimise over what is free, keeping the best; the longest misfit, and all, of keyframes."""
         log, span = self._log, self._span
         moments, marches = self._moments(*steps), stage == MARCH
         guided = span.guided if marches else ()
-        lures, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
-        journey = Journey(span.ways, level.points, moments, self._unit, guided, shifts, lures)
+        multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
+        journey = WayMisfit(span.ways, level.points, moments, self._unit, guided, corrections, multipliers)
         functional = self._functional(level, steps[1], journey, free, weight)
         smooth = Smoothness(self._chains(functional), weight)
         done, stopped, seen = log.evaluations, False, {}

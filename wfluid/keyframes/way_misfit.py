@@ -25,7 +25,7 @@ HOLD = 0.3
 """Weight of a pin's misfits between keyframes."""
 
 
-class Journey(ParticleObjective):
+class WayMisfit(ParticleObjective):
     """Misfits of particles on their ways.
 
     `points` are places at the beginning of the run. Between keyframes pins are held, and points may be led
@@ -39,13 +39,13 @@ class Journey(ParticleObjective):
         moments: Sequence[float],
         unit: float,
         guided: Sequence[bool] = (),
-        shifts: Mapping[float, np.ndarray] = NOTHING,
-        lures: Mapping[float, np.ndarray] = NOTHING,
+        corrections: Mapping[float, np.ndarray] = NOTHING,
+        multipliers: Mapping[float, np.ndarray] = NOTHING,
     ):
         """`moments` are times of the run, those of keyframes among them; `guided` says who is led, if any.
 
-        `shifts` are added to the places of a time, (n, 2) [longer side]; `lures` to what is aimed at there
-        without being the place.
+        `corrections` are added to the places of a time, (n, 2) [longer side]; `multipliers` move the aim
+        only: misfits are still measured from the place.
         """
         self.points, self.times = points, tuple(moments)
         self._unit = unit
@@ -65,8 +65,8 @@ class Journey(ParticleObjective):
             self._held[t] = np.where(keyed > 0, keyed, HOLD * pinned)
             under_way = np.array([t < way.particle.times[-1] for way in ways])
             self._led[t] = np.where(self._held[t] > 0, 0.0, led * under_way)
-        self._places = {t: aims + shifts.get(t, 0.0) for t, aims in self._aims.items()}
-        self._aims = {t: place + lures.get(t, 0.0) for t, place in self._places.items()}
+        self._places = {t: aims + corrections.get(t, 0.0) for t, aims in self._aims.items()}
+        self._aims = {t: place + multipliers.get(t, 0.0) for t, place in self._places.items()}
         self.left: dict[float, np.ndarray] = {}
 
     left: dict[float, np.ndarray]

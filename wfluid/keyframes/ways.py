@@ -17,7 +17,7 @@ import numpy as np
 
 from wfluid.domain.envelopes import Constant
 from wfluid.domain.timeline import Timeline
-from wfluid.keyframes.keyframes import Particle
+from wfluid.keyframes.keyframes import PointTarget
 from wfluid.model.gaussian_forces import GaussianForce
 
 BENDS = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7)
@@ -49,7 +49,7 @@ SAMPLES = 33
 class Way:
     """Where a particle is expected."""
 
-    particle: Particle
+    particle: PointTarget
     """Whose it is."""
     bend: float
     """How far it bends to its left, in parts of the length between two keyframes."""
@@ -81,7 +81,7 @@ class Way:
             yield start, end, a, b
 
 
-def ways_of(particles: Sequence[Particle], extent: tuple[float, float], seed: int) -> list[Way]:
+def plan_ways(particles: Sequence[PointTarget], extent: tuple[float, float], seed: int) -> list[Way]:
     """Ways that keep apart from one another and from the walls, as well as bends can do it.
 
     Which side they bend to is the seed's choice, if both are as good.
@@ -132,7 +132,7 @@ def radii_of(ways: Sequence[Way], factor: float = 1.0) -> list[float]:
     return found
 
 
-def edges_of(ways: Sequence[Way], radii: Sequence[float], timeline: Timeline) -> list[int]:
+def window_edges(ways: Sequence[Way], radii: Sequence[float], timeline: Timeline) -> list[int]:
     """The steps at which windows begin and end: at keyframes, and between them about a radius apart."""
     times = sorted({t for way in ways for t in way.particle.times})
     stops = [0, *(round(t / timeline.dt) for t in times)]

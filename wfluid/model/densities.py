@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
 from wfluid.domain.paths import Center, as_center, place_at
 from wfluid.domain.piecewise import finite
-from wfluid.model.force import Blob, check_radius, impulse_slopes, shape_slopes
+from wfluid.model.force import GaussianImpulse, check_radius, impulse_slopes, shape_slopes
 from wfluid.model.painted import VISCOSITY_LIMIT, Painted
 
 LOOKS = ("ink", "smoke")
@@ -44,13 +44,13 @@ class Source:
             raise ValueError(f"Source.rate {self.rate:g}: the limit is {RATE_LIMIT:g}/s")
         check_radius("Source.radius", self.radius)
 
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """What it pours from `start` to `end` [s]."""
         amount = self.rate * self.envelope.integral(start, end)
-        return Blob(place_at(self.center, (start + end) / 2), self.radius, amount=amount)
+        return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, amount=amount)
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
-        """As `BlobForce.pull_back`, with respect to "rate", "radius", center and envelope."""
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
+        """As `LocalForce.pull_back`, with respect to "rate", "radius", center and envelope."""
         shape = shape_slopes(self.center, start, end, bar)
         return impulse_slopes("rate", self.rate, self.envelope, start, end, bar.amount) | shape
 

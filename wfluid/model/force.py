@@ -1,8 +1,8 @@
 """What moves the fluid, as frozen descriptions: a shape in space times an envelope in time.
 
 Most shapes are Gaussians g = exp(-|x - c|^2 / 2 sigma^2) about a center c that may move, or such times a
-low power of x - c: `Blob` holds the numbers of one over a step. The others are fields over the whole
-picture (`Field`), made once.
+low power of x - c: `GaussianImpulse` holds the numbers of one over a step. The others are fields over the
+whole picture (`Field`), made once.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LEAST_RADIUS, MOST_RADIUS = 1e-6, 1e3
 
 
 @dataclass(frozen=True)
-class Blob:
+class GaussianImpulse:
     """What a Gaussian of one force does over one step; r = (x - center) / radius, g = exp(-r^2 / 2)."""
 
     center: Place
@@ -63,17 +63,17 @@ class Force(ABC):
         return replace(self, envelope=product(self.envelope, envelope))
 
 
-class BlobForce(Force):
+class LocalForce(Force):
     """A force whose shape is a Gaussian's."""
 
     @abstractmethod
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """What it does from `start` to `end` [s]."""
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
-        """The gradient with respect to the force's numbers, from `bar`, that to those of `over(start, end)`.
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
+        """Gradient by the force's numbers, from `bar`, that by the numbers of `impulse(start, end)`.
 
-        This is the transpose of the derivative of `over`, in float64, under attribute paths: "center" (2,),
+        The transpose of the derivative of `impulse`, in float64, under attribute paths: "center" (2,),
         or "center.places" (k, 2) of a `Path`; "envelope.period". What is not there, such as the numbers of
         a function, is taken as fixed. Nothing by default.
         """
@@ -102,7 +102,7 @@ class FieldForce(Force):
     def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
         """The gradient with respect to the force's numbers, from `bar`, that to each of `integrals`.
 
-        As `BlobForce.pull_back`; the fields, with the numbers that made them, are taken as fixed. By
+        As `LocalForce.pull_back`; the fields, with the numbers that made them, are taken as fixed. By
         default those of a lone field's envelope, and nothing of several fields.
         """
         return scaled(self.envelope.slopes(start, end), bar[0], "envelope.") if len(bar) == 1 else {}
@@ -130,10 +130,10 @@ class Group:
     def __post_init__(self) -> None:
         finite("Group.strength", self.strength)
         common = product(self.strength, self.envelope)
-        object.__setattr__(self, "forces", tuple(force.under(common) for force in flat(self.members)))
+        object.__setattr__(self, "forces", tuple(force.under(common) for force in flatten(self.members)))
 
 
-def flat(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
+def flatten(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
     """The forces themselves, those of groups in their place.
 
     Raises:
@@ -160,7 +160,7 @@ def impulse_slopes(
     return {name: np.array(own)} | scaled(envelope.slopes(start, end), np.dot(number, bar), "envelope.")
 
 
-def shape_slopes(center: Center, start: float, end: float, bar: Blob) -> Slopes:
+def shape_slopes(center: Center, start: float, end: float, bar: GaussianImpulse) -> Slopes:
     """The gradient with respect to radius and center, from that to those of the blob of a step."""
     radius = np.array(bar.radius, dtype=np.float64)
     return {"radius": radius} | center_slopes(center, (start + end) / 2, bar.center)
@@ -170,7 +170,7 @@ def on_faces(
     force: Sequence[np.ndarray], weight: Painted | None, grid: Grid, walls: Walls
 ) -> tuple[np.ndarray, np.ndarray]:
     """A field's components on faces (ny, nx), times the weight's means there, and 0 on closed walls."""
-    at_centres = None if weight is None else weight.on(grid)
+    at_centres = None if weight is None else weight.sample(grid)
     closed = (slice(None), 0), (0, slice(None))
     out = []
     for n, (f, periodic) in enumerate(zip(force, walls.periodic, strict=True)):

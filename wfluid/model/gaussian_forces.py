@@ -10,7 +10,14 @@ import numpy as np
 from wfluid.domain.envelopes import Constant, Envelope, Instantaneous, Slopes, scaled
 from wfluid.domain.paths import Center, as_center, place, place_at
 from wfluid.domain.piecewise import finite
-from wfluid.model.force import Blob, BlobForce, check_acceleration, check_radius, impulse_slopes, shape_slopes
+from wfluid.model.force import (
+    GaussianImpulse,
+    LocalForce,
+    check_acceleration,
+    check_radius,
+    impulse_slopes,
+    shape_slopes,
+)
 from wfluid.model.painted import Painted
 
 RATE_LIMIT = 100.0
@@ -21,7 +28,7 @@ STEP_GROWTH = 0.5
 
 
 @dataclass(frozen=True)
-class GaussianForce(BlobForce):
+class GaussianForce(LocalForce):
     """A push around a point: vector exp(-|x - center|^2 / 2 radius^2) times the envelope.
 
     A moving center is taken at the middle of a step: second order in the step.
@@ -48,20 +55,20 @@ class GaussianForce(BlobForce):
         check_acceleration("force", math.hypot(*self.vector))
         check_radius("GaussianForce.radius", self.radius)
 
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """The vector times the envelope's integral."""
         impulse = self.envelope.integral(start, end)
         push = (self.vector[0] * impulse, self.vector[1] * impulse)
-        return Blob(place_at(self.center, (start + end) / 2), self.radius, push=push)
+        return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, push=push)
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
         """With respect to "vector" (2,), "radius", center and envelope."""
         shape = shape_slopes(self.center, start, end, bar)
         return impulse_slopes("vector", self.vector, self.envelope, start, end, bar.push) | shape
 
 
 @dataclass(frozen=True)
-class VortexForce(BlobForce):
+class VortexForce(LocalForce):
     """A twirl: spin (-(y - center_y), x - center_x) exp(-|x - center|^2 / 2 radius^2) times the envelope.
 
     It is free of divergence, so that no pressure takes a part of it: in a free flow the center turns by
@@ -88,12 +95,12 @@ class VortexForce(BlobForce):
         finite("VortexForce.spin", self.spin)
         check_acceleration("vortex", abs(self.spin) * self.radius)
 
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """Spin times radius times the envelope's integral."""
         turn = self.spin * self.radius * self.envelope.integral(start, end)
-        return Blob(place_at(self.center, (start + end) / 2), self.radius, turn=turn)
+        return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, turn=turn)
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
         """With respect to "spin", "radius", center and envelope."""
         slopes = impulse_slopes("spin", self.spin, self.envelope, start, end, self.radius * bar.turn)
         slopes |= shape_slopes(self.center, start, end, bar)
@@ -102,7 +109,7 @@ class VortexForce(BlobForce):
 
 
 @dataclass(frozen=True)
-class Growth(BlobForce):
+class Growth(LocalForce):
     """Grow (rate > 0) or shrink: a prescribed divergence rate (1 - r^2 / 2) exp(-r^2 / 2) times the envelope.
 
     r is the distance from the center in radii. The ring beyond r = sqrt(2) gives way for what the middle
@@ -136,14 +143,14 @@ class Growth(BlobForce):
         if isinstance(self.envelope, Instantaneous):
             raise ValueError("a growth takes time: give it a window instead of an instant")
 
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """The rate's mean over the step."""
         length = end - start
         course = self.envelope.integral(start, end) / length if length > 0 else self.envelope.value(start)
         mean = self.rate * course
-        return Blob(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
+        return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
         """With respect to "rate", "radius", center and envelope."""
         shape = shape_slopes(self.center, start, end, bar)
         if end > start:

@@ -63,7 +63,7 @@ class Painted:
         if self.floor > self.scale:
             raise ValueError(f"floor {self.floor:g} is above scale {self.scale:g}")
 
-    def on(self, grid: Grid) -> np.ndarray:
+    def sample(self, grid: Grid) -> np.ndarray:
         """The means over the grid's cells, (ny, nx)."""
         return _on_grid(self, grid)
 
@@ -97,9 +97,9 @@ class Keyed:
         times = list(self.keys)
         after = bisect_right(times, t)
         if after in (0, len(times)):
-            return value_on(self.keys[times[max(after - 1, 0)]], grid, t)
+            return sample_at(self.keys[times[max(after - 1, 0)]], grid, t)
         t0, t1 = times[after - 1], times[after]
-        start, end = (value_on(self.keys[time], grid, t) for time in (t0, t1))
+        start, end = (sample_at(self.keys[time], grid, t) for time in (t0, t1))
         return start + (end - start) * ((t - t0) / (t1 - t0))
 
 
@@ -138,9 +138,9 @@ class Freeze:
                 "the freeze mask is painted all over, so nothing could move: leave what should move black"
             )
 
-    def on(self, grid: Grid) -> np.ndarray:
+    def sample(self, grid: Grid) -> np.ndarray:
         """Drag [1/s] of the grid's cells, (ny, nx)."""
-        return np.expm1(self.paint.on(grid) * math.log1p(self.strength))
+        return np.expm1(self.paint.sample(grid) * math.log1p(self.strength))
 
 
 def as_quantity(name: str, what: Quantity | np.ndarray | Picture) -> Quantity:
@@ -163,7 +163,7 @@ def as_quantity(name: str, what: Quantity | np.ndarray | Picture) -> Quantity:
     return float(what)
 
 
-def value_on(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
+def sample_at(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
     """A quantity at time t [s]: one number, or (ny, nx) for the grid's cells.
 
     Raises:
@@ -172,10 +172,10 @@ def value_on(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
     if isinstance(what, float):
         return what
     if isinstance(what, Painted):
-        return what.on(grid)
+        return what.sample(grid)
     if isinstance(what, Keyed):
         return what.at(t, grid)
-    return value_on(as_quantity(f"viscosity at {t:g} s", what(t)), grid, t)
+    return sample_at(as_quantity(f"viscosity at {t:g} s", what(t)), grid, t)
 
 
 def check_painted(viscosity: np.ndarray | float) -> None:

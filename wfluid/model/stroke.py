@@ -12,12 +12,12 @@ import numpy as np
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
 from wfluid.domain.paths import Path, Place
 from wfluid.domain.piecewise import finite
-from wfluid.model.force import Blob, BlobForce, check_acceleration, check_radius
+from wfluid.model.force import GaussianImpulse, LocalForce, check_acceleration, check_radius
 from wfluid.model.painted import Painted
 
 
 @dataclass(frozen=True)
-class Stroke(BlobForce):
+class Stroke(LocalForce):
     """A drag along a polyline: a Gaussian that moves along a path and pushes the way it goes.
 
     Its acceleration |V| V strength / (radius sqrt(2 pi)), V the path's velocity, gives a free particle
@@ -53,7 +53,7 @@ class Stroke(BlobForce):
             factor = strength * math.hypot(vx, vy) / (self.radius * math.sqrt(2 * math.pi))
             yield t0, t1, (vx * factor, vy * factor)
 
-    def over(self, start: float, end: float) -> Blob:
+    def impulse(self, start: float, end: float) -> GaussianImpulse:
         """The pieces of the path within the step, each in its direction."""
         px, py = 0.0, 0.0
         for t0, t1, (ax, ay) in self._pieces(self.strength):
@@ -61,9 +61,9 @@ class Stroke(BlobForce):
                 impulse = self.envelope.integral(max(t0, start), min(t1, end))
                 px, py = px + ax * impulse, py + ay * impulse
         begin, stop = max(start, self.path.times[0]), min(end, self.path.times[-1])
-        return Blob(self.path.at((begin + stop) / 2), self.radius, push=(px, py))
+        return GaussianImpulse(self.path.at((begin + stop) / 2), self.radius, push=(px, py))
 
-    def pull_back(self, start: float, end: float, bar: Blob) -> Slopes:
+    def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
         """With respect to "strength", "radius" and envelope; the path is taken as fixed."""
         own = 0.0
         course = scaled(self.envelope.slopes(start, start), 0.0, "envelope.")

@@ -22,7 +22,7 @@ from wfluid.view.coordinate_map import CoordinateMap
 
 
 @dataclass(frozen=True, eq=False)
-class Passage:
+class FlowMaps:
     """What lies at the start, and at the end, for every place at every step of a flow."""
 
     grid: Grid
@@ -67,7 +67,7 @@ def _between(maps: np.ndarray, part: float | np.ndarray) -> np.ndarray:
     return (1 - rest) * before + rest * after
 
 
-def passage_of(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> Passage:
+def flow_maps(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> FlowMaps:
     """Run a flow from rest, and back: its maps after every step."""
     now, spare, walls = solver.rest(), solver.rest(), solver.fluid.walls
     shape = (timeline.steps + 1, solver.grid.ny, solver.grid.nx, 2)
@@ -88,4 +88,4 @@ def passage_of(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> P
         solver.carry(now, spare, -timeline.dt)
         now, spare = spare, now
         to_end[step] = CoordinateMap.of_state(now, walls).displacement
-    return Passage(solver.grid, walls, from_start, to_end)
+    return FlowMaps(solver.grid, walls, from_start, to_end)

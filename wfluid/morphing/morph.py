@@ -29,11 +29,11 @@ from wfluid.keyframes.match import Match, match_keyframes
 from wfluid.keyframes.search import Progress
 from wfluid.model.fluid import Fluid
 from wfluid.model.painted import Painted
-from wfluid.morphing.flow_maps import Passage, passage_of
+from wfluid.morphing.flow_maps import FlowMaps, flow_maps
 from wfluid.morphing.frame import MorphFrame
-from wfluid.morphing.settings import Course
+from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.blend import blended
-from wfluid.pictures.pairing import Pair, paired
+from wfluid.pictures.pairing import PicturePair, paired
 from wfluid.pictures.picture import Picture
 from wfluid.view.quality import measure_map
 
@@ -60,9 +60,9 @@ class Morph:
 
     match: Match
     """The flow's forces, and how near points of the first picture come to those of the second."""
-    pair: Pair
+    pair: PicturePair
     """The pictures; the first is the match's."""
-    course: Course
+    settings: MorphSettings
     """How it goes."""
     said: list[str] = field(default_factory=list)
     """What was done to the mask that a user should know, once the first frame is there."""
@@ -75,23 +75,23 @@ class Morph:
     @property
     def frame_count(self) -> int:
         """Frames shown."""
-        return len(self.course.order)
+        return len(self.settings.order)
 
     @cached_property
-    def passage(self) -> Passage:
+    def passage(self) -> FlowMaps:
         """The flow's maps."""
         began, animation = time.perf_counter(), self.animation
-        found = passage_of(animation.solver, animation.forces, animation.timeline)
+        found = flow_maps(animation.solver, animation.forces, animation.timeline)
         animation.seconds.simulate += time.perf_counter() - began
         return found
 
     @cached_property
     def _ahead(self) -> np.ndarray | None:
         """Where the warp happens first, on the grid: the mask, softened until no map of a frame folds."""
-        mask, grid = self.course.mask, self.animation.grid
+        mask, grid = self.settings.mask, self.animation.grid
         if mask is None:
             return None
-        painted, state = mask.on(grid), self.animation.solver.rest()
+        painted, state = mask.sample(grid), self.animation.solver.rest()
         without = min(self._least_jacobian(None, state), LEAST_JACOBIAN)
         sigma, ahead = 0.0, painted
         while self._least_jacobian(ahead, state) < without and sigma < 1:
@@ -106,7 +106,7 @@ class Morph:
     def _least_jacobian(self, ahead: np.ndarray | None, state) -> float:
         """The least det J of both maps over all frames."""
         least = math.inf
-        for index in range(self.course.timeline.frames):
+        for index in range(self.settings.timeline.frames):
             part = self._warped(index, ahead)
             for warp in (self.passage.since_start(part), self.passage.until_end(part)):
                 self.animation.solver.set_map(state, warp.displacement)
@@ -114,12 +114,12 @@ class Morph:
         return least
 
     def _part(self, index: int) -> float:
-        return index / (self.course.timeline.frames - 1)
+        return index / (self.settings.timeline.frames - 1)
 
     def _warped(self, index: int, ahead: np.ndarray | None) -> np.ndarray:
         """The part of the flow's time that a frame shows: one number, or (ny, nx)."""
-        part, course = self._part(index), self.course
-        far = course.warp_curve.at(part if ahead is None else local(part, ahead, course.delay))
+        part, settings = self._part(index), self.settings
+        far = settings.warp_curve.at(part if ahead is None else local(part, ahead, settings.delay))
         return np.interp(far, self._ways, np.linspace(0.0, 1.0, len(self._ways)))
 
     @cached_property
@@ -140,12 +140,12 @@ class Morph:
 
     def frames(self) -> Iterator[MorphFrame]:
         """The frames, in their order; the first picture's is the picture itself, and the second's."""
-        animation, course = self.animation, self.course
+        animation, settings = self.animation, self.settings
         clock, solver, walls = time.perf_counter, animation.solver, animation.fluid.walls
         shown = [animation.look_up(picture) for picture in (self.pair.a, self.pair.b)]
         state, ahead, passage = solver.rest(), self._ahead, self.passage
-        mask = course.mask and course.mask.resampled(shown[0].width, shown[0].height)
-        for number, index in enumerate(course.order):
+        mask = settings.mask and settings.mask.resampled(shown[0].width, shown[0].height)
+        for number, index in enumerate(settings.order):
             began = clock()
             part = self._warped(index, ahead)
             maps, qualities, pictures = (passage.since_start(part), passage.until_end(part)), [], []
@@ -158,13 +158,13 @@ class Morph:
                 pictures.append(look_up.untouched if still else look_up.render(state.d_x, state.d_y))
                 lookup += clock() - looked
             own = self._part(index)
-            weight = course.blend_curve.at(own if mask is None else local(own, mask, course.delay))
-            picture = blended(*pictures, weight, course.blend)
+            weight = settings.blend_curve.at(own if mask is None else local(own, mask, settings.delay))
+            picture = blended(*pictures, weight, settings.blend)
             animation.seconds.lookup += lookup
             animation.seconds.simulate += clock() - began - lookup
             yield MorphFrame(
                 number,
-                number / course.timeline.fps,
+                number / settings.timeline.fps,
                 picture,
                 maps[0],
                 qualities[0],
@@ -217,13 +217,15 @@ def morph(
     `points` are pairs of points that correspond, (n, 2, 2) or (n, 4): x, y in a [longer side of a] and x, y
     in b [longer side of b]. `pins` are places of a that stay. The frames are as large as a, or as `settings`
     say, which are those of `Animation`: cells, width, height, filter, edge, device. `fit` says how b covers
-    them ("fill", "fit" with bars, "stretch"), the others are those of `Course` and of `match_keyframes`.
+    them ("fill", "fit" with bars, "stretch"); the others are those of `MorphSettings` and `match_keyframes`.
 
     Raises:
         ValueError: no points, or not pairs of two numbers; points outside a, or outside what is seen of b;
-            what `Course`, `paired` and `match_keyframes` refuse.
+            what `MorphSettings`, `paired` and `match_keyframes` refuse.
     """
-    course = Course(Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong)
+    shape = MorphSettings(
+        Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
+    )
     pair = paired(a, b, fit)
     fluid = Fluid(viscosity=VISCOSITY) if fluid is None else fluid
     animation = Animation(a, fluid, [], FLOW, **settings)
@@ -235,7 +237,7 @@ def morph(
     found = match_keyframes(
         animation, keyframes, pins=pins, tolerance=tolerance, seed=seed, progress=progress, factors=FACTORS
     )
-    return Morph(found, pair, course)
+    return Morph(found, pair, shape)
 
 
 def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:

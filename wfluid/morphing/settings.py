@@ -14,7 +14,7 @@ from wfluid.pictures.blend import check_light
 
 
 @dataclass(frozen=True)
-class Course:
+class MorphSettings:
     """How a morph goes.
 
     Raises:

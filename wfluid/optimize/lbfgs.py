@@ -156,7 +156,7 @@ class _AtPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class State(_AtPoint):
+class Iterate(_AtPoint):
     """A minimisation between two iterations: all that it needs to go on as if it had never stopped."""
 
     best: Point
@@ -186,7 +186,7 @@ class Minimum(_AtPoint):
     """Why it ended."""
     evaluations: int
     """So many in all, those of a line search cut short included."""
-    state: State
+    state: Iterate
     """After the last whole iteration: `minimise` goes on from it."""
 
     @property
@@ -210,9 +210,9 @@ class Minimum(_AtPoint):
 
 def minimise(
     value_and_gradient: Function,
-    start: np.ndarray | State,
+    start: np.ndarray | Iterate,
     settings: Settings | None = None,
-    callback: Callable[[State], bool] | None = None,
+    callback: Callable[[Iterate], bool] | None = None,
 ) -> Minimum:
     """Find a local minimum of a function downhill from a start, or go on from a state.
 
@@ -223,7 +223,7 @@ def minimise(
     """
     settings = settings or Settings()
     function = _Counted(value_and_gradient, settings.evaluations)
-    state = function.resume(start) if isinstance(start, State) else function.begin(_vector(start))
+    state = function.resume(start) if isinstance(start, Iterate) else function.begin(_vector(start))
     status = _stop(None, state, settings)
     while status is None:
         try:
@@ -265,7 +265,7 @@ def _downhill(gradient: np.ndarray, length: float) -> np.ndarray:
     return unit * (-length / np.linalg.norm(unit))
 
 
-def _stop(before: State | None, state: State, settings: Settings) -> Status | None:
+def _stop(before: Iterate | None, state: Iterate, settings: Settings) -> Status | None:
     """Whether to end at a state, after an iteration from the one before."""
     if not state.point.is_finite:
         return Status.NOT_FINITE
@@ -278,7 +278,7 @@ def _stop(before: State | None, state: State, settings: Settings) -> Status | No
     return Status.EVALUATIONS if state.evaluations >= settings.evaluations else None
 
 
-def _little_gained(before: State, after: State, settings: Settings) -> Status | None:
+def _little_gained(before: Iterate, after: Iterate, settings: Settings) -> Status | None:
     """Whether an iteration gained so little that it should be the last."""
     if not (_is_lower_of_late(after.values) or _is_lower_of_late(after.slopes)):
         return Status.FLAT
@@ -292,7 +292,7 @@ def _is_lower_of_late(history: tuple[float, ...]) -> bool:
     return len(history) <= PATIENCE or min(history[-PATIENCE:]) < min(history[:-PATIENCE])
 
 
-def _descend(function: _Counted, state: State, settings: Settings) -> tuple[Point, bool] | None:
+def _descend(function: _Counted, state: Iterate, settings: Settings) -> tuple[Point, bool] | None:
     """The next point, and whether the memory led there; None if there is none, even along -g."""
     if state.steps:
         direction = descent_direction(state.gradient, state.steps, state.differences)
@@ -302,7 +302,7 @@ def _descend(function: _Counted, state: State, settings: Settings) -> tuple[Poin
     return point and (point, False)
 
 
-def _along(function: _Counted, state: State, direction: np.ndarray, settings: Settings) -> Point | None:
+def _along(function: _Counted, state: Iterate, direction: np.ndarray, settings: Settings) -> Point | None:
     """Where a search along a direction ends, whose first trial is all of it."""
 
     def sample(step: float) -> Sample:
@@ -332,8 +332,8 @@ def _slope(point: Point, direction: np.ndarray) -> float:
 
 @np.errstate(all="ignore")
 def _advanced(
-    state: State, point: Point, keeps_memory: bool, function: _Counted, settings: Settings
-) -> State:
+    state: Iterate, point: Point, keeps_memory: bool, function: _Counted, settings: Settings
+) -> Iterate:
     """The state at the next point, with the pair that leads there if it tells of positive curvature."""
     steps, differences = (state.steps, state.differences) if keeps_memory else ((), ())
     s, y = _frozen(point.x - state.x), _frozen(point.gradient - state.gradient)
@@ -341,7 +341,7 @@ def _advanced(
         steps = (*steps, s)[-settings.memory :]
         differences = (*differences, y)[-settings.memory :]
     values, slopes = (*state.values, point.value), (*state.slopes, point.steepness)
-    return State(point, function.best, steps, differences, values, slopes, function.evaluations)
+    return Iterate(point, function.best, steps, differences, values, slopes, function.evaluations)
 
 
 class _Spent(Exception):
@@ -357,12 +357,12 @@ class _Counted:
         self.evaluations = 0
         self.best: Point | None = None
 
-    def begin(self, x: np.ndarray) -> State:
+    def begin(self, x: np.ndarray) -> Iterate:
         """The state at a start."""
         point = self.best = self(x)
-        return State(point, point, (), (), (point.value,), (point.steepness,), self.evaluations)
+        return Iterate(point, point, (), (), (point.value,), (point.steepness,), self.evaluations)
 
-    def resume(self, state: State) -> State:
+    def resume(self, state: Iterate) -> Iterate:
         """The same state, whose evaluations and lowest point are this function's."""
         self.evaluations, self.best = state.evaluations, state.best
         return state

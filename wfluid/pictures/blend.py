@@ -7,7 +7,7 @@ import numpy as np
 from wfluid.pictures import color
 from wfluid.pictures.picture import Picture
 
-LIGHTS = ("linear", "display")
+BLEND_SPACES = ("linear", "display")
 """What is mixed: light, or the numbers that a display is sent (sRGB)."""
 
 
@@ -17,8 +17,8 @@ def check_light(light: str) -> None:
     Raises:
         ValueError: with those that do.
     """
-    if light not in LIGHTS:
-        raise ValueError(f"blend in {light!r} light: expected one of {', '.join(LIGHTS)}")
+    if light not in BLEND_SPACES:
+        raise ValueError(f"blend in {light!r} light: expected one of {', '.join(BLEND_SPACES)}")
 
 
 def blended(a: Picture, b: Picture, weight: float | np.ndarray, light: str = "linear") -> Picture:

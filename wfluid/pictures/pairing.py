@@ -14,7 +14,7 @@ FITS = ("fill", "fit", "stretch")
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class PicturePair:
     """Two pictures of one kind; the second fitted to the frame of the first."""
 
     a: Picture
@@ -93,7 +93,7 @@ def seen(picture: Picture, through: Window) -> Picture:
     return replace(picture, pixels=pixels)
 
 
-def paired(a: Picture, b: Picture, fit: str) -> Pair:
+def paired(a: Picture, b: Picture, fit: str) -> PicturePair:
     """Two pictures as a morph needs them: see `window` and `alike`.
 
     Raises:
@@ -101,7 +101,7 @@ def paired(a: Picture, b: Picture, fit: str) -> Pair:
     """
     through = window((b.width, b.height), (a.width, a.height), fit)
     first, second, said = alike(a, b)
-    return Pair(first, seen(second, through), through, (b.width, b.height), tuple(said))
+    return PicturePair(first, seen(second, through), through, (b.width, b.height), tuple(said))
 
 
 def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:

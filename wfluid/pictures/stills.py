@@ -21,7 +21,7 @@ from wfluid.pictures.formats import (
     first_line,
 )
 from wfluid.pictures.picture import Picture, encode
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 from wfluid.system.memory import free_memory, readable_size
 from wfluid.system.stderr import quiet_stderr
 
@@ -125,7 +125,7 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
         spec.attribute("compression", encoding.compression)
     if encoding.quality is not None:
         spec.attribute("compression", f"{QUALITIES[ending]}:{encoding.quality}")
-    with whole_file(path) as temporary, quiet_stderr():
+    with atomic_file(path) as temporary, quiet_stderr():
         out = oiio.ImageOutput.create(str(temporary))
         if out is None:
             raise PictureError(f"{path}: cannot be written ({first_line(oiio.geterror())})")

@@ -12,7 +12,7 @@ from wfluid.model.densities import LOOKS
 from wfluid.model.fluid import SCHEMES, SOLVERS
 from wfluid.model.image_force import KINDS
 from wfluid.model.painted import DRAG_LIMIT, VISCOSITY_LIMIT
-from wfluid.pictures.blend import LIGHTS
+from wfluid.pictures.blend import BLEND_SPACES
 from wfluid.pictures.formats import COLORSPACES, TYPES
 from wfluid.pictures.pairing import FITS
 from wfluid.pictures.sampling import EDGES, FILTERS
@@ -437,7 +437,9 @@ SCENE = Table(
                 "blend_curve": Key(
                     "how much of it is seen, the same", _curve, "a word or keys", default="ease"
                 ),
-                "blend": Key("what is mixed: light, or display values", **word(*LIGHTS), default="linear"),
+                "blend": Key(
+                    "what is mixed: light, or display values", **word(*BLEND_SPACES), default="linear"
+                ),
                 "timing": _file("a mask, white where it happens first"),
                 "delay": Key(
                     "how much later it happens where the mask is black, a part of the duration",

@@ -12,7 +12,7 @@ from tomlkit.exceptions import ParseError, TOMLKitError
 from wfluid.pictures.formats import PictureError
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SceneError
-from wfluid.system.atomic import whole_file
+from wfluid.system.atomic import atomic_file
 
 
 def read_scene(path: str | os.PathLike) -> Scene:
@@ -51,7 +51,7 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
     for key, value in scene.moved(path.parent).tables.items():
         document[key] = value
     try:
-        with whole_file(path) as temporary:
+        with atomic_file(path) as temporary:
             temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
     except OSError as error:
         raise PictureError(f"{path}: cannot be written ({error.strerror})") from error

@@ -25,7 +25,7 @@ COARSEST = 16
 
 
 @dataclass(frozen=True)
-class Points:
+class Location:
     """Which points of a grid one component of the unknowns lies on."""
 
     rules: tuple[Rule, Rule]
@@ -46,7 +46,7 @@ class Level(ABC):
     """Damping of the paper's plain Jacobi sweeps."""
 
     def __init__(
-        self, nx: int, ny: int, size: tuple[float, float], points: Sequence[Points], device: wp.Device
+        self, nx: int, ny: int, size: tuple[float, float], points: Sequence[Location], device: wp.Device
     ):
         self.layout = Layout(nx, ny)
         self.device = device

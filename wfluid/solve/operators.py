@@ -13,7 +13,7 @@ from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.solve import algebra, five_point, stress
 from wfluid.solve.chebyshev import chebyshev_factors
-from wfluid.solve.multigrid import Level, Points
+from wfluid.solve.multigrid import Level, Location
 
 SMOOTHED = 0.45
 """Least eigenvalue of D^-1 A that the sweeps of a five-point equation damp; what lies below is smooth and
@@ -33,7 +33,7 @@ STRESS_INTERVAL = (0.65, 1.0)
 """The same for the coupled equation, where viscosity is smooth: 0.78 constant, 0.72 at a contrast of 50."""
 
 
-class _Numbers:
+class Scalars:
     """Numbers in device memory by name, so that a captured graph follows them when they change."""
 
     def __init__(self, device: wp.Device, *names: str):
@@ -52,9 +52,9 @@ class FivePoint(Level):
     Solved for diffusion (shift 1, scale dt mu) and for pressure (shift 0, scale 1).
     """
 
-    def __init__(self, nx: int, ny: int, size: tuple[float, float], points: Points, device: wp.Device):
+    def __init__(self, nx: int, ny: int, size: tuple[float, float], points: Location, device: wp.Device):
         super().__init__(nx, ny, size, [points], device)
-        self.numbers = _Numbers(device, "centre", "ax", "ay", "own", "near", "first", "second", "plain")
+        self.numbers = Scalars(device, "centre", "ax", "ay", "own", "near", "first", "second", "plain")
         self.rates = (self.numbers.first, self.numbers.second)
         self.plain = self.numbers.plain
         self.least = 0.0
@@ -104,14 +104,14 @@ class FivePoint(Level):
         self.fill(out)
 
 
-class Resisted(Level):
+class VariablePoisson(Level):
     """-div (beta grad q), beta on the faces: pressure where drag resists."""
 
-    def __init__(self, medium: MediumLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
+    def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
-        super().__init__(layout.nx, layout.ny, size, [Points(walls.centre_rules())], device)
+        super().__init__(layout.nx, layout.ny, size, [Location(walls.centre_rules())], device)
         self.medium = medium
-        self.numbers = _Numbers(device, "ax", "ay", "first", "second", "plain")
+        self.numbers = Scalars(device, "ax", "ay", "first", "second", "plain")
         self.rates = (self.numbers.first, self.numbers.second)
         self.plain = self.numbers.plain
         first, second = chebyshev_factors(SMOOTHED, 2.0, 2)
@@ -134,17 +134,17 @@ class Resisted(Level):
         five_point.jacobi_beta.launch(self.layout, self.device, inputs, out)
 
 
-class Stress(Level):
+class ViscousStress(Level):
     """v + dt alpha v - dt div (mu (grad v + grad v^T)): variable viscosity and drag, u and v coupled."""
 
-    def __init__(self, medium: MediumLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
+    def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
-        points = [Points(walls.u_rules(), (True, False)), Points(walls.v_rules(), (False, True))]
+        points = [Location(walls.u_rules(), (True, False)), Location(walls.v_rules(), (False, True))]
         super().__init__(layout.nx, layout.ny, size, points, device)
         self.medium = medium
         self.weights = vector(layout, device, 2)
         rates = [f"rate_{n}" for n in range(SWEEPS_STRESS)]
-        self.numbers = _Numbers(
+        self.numbers = Scalars(
             device, "dt", "normal_x", "normal_y", "shear_x", "shear_y", "cross", "plain", *rates
         )
         self.rates = tuple(getattr(self.numbers, rate) for rate in rates)
@@ -201,7 +201,7 @@ class Stress(Level):
                 stress.sweep.launch(self.layout, self.device, inputs, [out[own]])
 
 
-class MediumLevel:
+class CoefficientLevel:
     """Viscosity and drag on one grid."""
 
     def __init__(self, nx: int, ny: int, walls: Walls, device: wp.Device):

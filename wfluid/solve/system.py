@@ -41,7 +41,7 @@ USUAL_TOLERANCE = 5e-4
 
 
 @dataclass(frozen=True)
-class Solve:
+class SolveMethod:
     """How a system is solved: a method and how often it is applied."""
 
     method: str
@@ -74,10 +74,10 @@ class Residual:
         return self.norm / whole if whole > 0 else 0.0
 
 
-def conjugate_gradients(tolerance: float) -> Solve:
+def conjugate_gradients(tolerance: float) -> SolveMethod:
     """Conjugate gradients to a tolerance, with as many iterations at most as its digits ask for."""
     digits = max(1.0, math.log(tolerance) / math.log(USUAL_TOLERANCE))
-    return Solve("conjugate gradients", math.ceil(ITERATION_LIMIT * digits), tolerance)
+    return SolveMethod("conjugate gradients", math.ceil(ITERATION_LIMIT * digits), tolerance)
 
 
 class LinearSystem:
@@ -132,7 +132,7 @@ class LinearSystem:
             matrix, other = other, matrix
         self.inverse = matrix
 
-    def plan_sweeps(self, low: float, high: float, scale: float, tolerance: float) -> Solve | None:
+    def plan_sweeps(self, low: float, high: float, scale: float, tolerance: float) -> SolveMethod | None:
         """The Chebyshev sweeps that leave at most `tolerance` of any b, or None where cycles cost less.
 
         `low` and `high` bound the eigenvalues of M^-1 A; `scale` is what the sweeps' rates carry of M.
@@ -143,13 +143,13 @@ class LinearSystem:
         factors = chebyshev_factors(low, high, sweeps)
         factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]  # short and long in turn
         self._rates.assign(np.pad(factors / scale, (0, SWEEP_LIMIT - sweeps)))
-        return Solve("chebyshev", sweeps)
+        return SolveMethod("chebyshev", sweeps)
 
-    def plan_cycles(self, tolerance: float) -> Solve:
+    def plan_cycles(self, tolerance: float) -> SolveMethod:
         """The fewest cycles that leave at most `tolerance` of any b."""
-        return Solve("multigrid", chebyshev_count(*self.interval, tolerance))
+        return SolveMethod("multigrid", chebyshev_count(*self.interval, tolerance))
 
-    def prepare(self, how: Solve) -> None:
+    def prepare(self, how: SolveMethod) -> None:
         """Make ready, before a graph is captured, what a solve keeps on the device."""
         cycles = how.iterations
         if how.method == "multigrid" and cycles not in self._factors:
@@ -158,7 +158,7 @@ class LinearSystem:
         if how.method == "conjugate gradients" and self._conjugate is None:
             self._conjugate = ConjugateGradients(self.levels[0], self.zero, self.cycle, self.device)
 
-    def solve(self, how: Solve, b: Vector, x: Vector, whole: Vector | None = None) -> None:
+    def solve(self, how: SolveMethod, b: Vector, x: Vector, whole: Vector | None = None) -> None:
         """X = what `how` makes of b. Fills the ghosts of b and x.
 
         Conjugate gradients stop when what x misses is `tolerance` of x, and of `whole` where given.
@@ -220,7 +220,7 @@ class LinearSystem:
             dense.multiply.launch(cells, self.device, inputs, [f])
         level.fill(out)
 
-    def measure(self, how: Solve, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
+    def measure(self, how: SolveMethod, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
         """The true residual of a solve; `norm_a` is a bound of ||A||."""
         top = self.levels[0]
         top.residual(b, x, self.left)

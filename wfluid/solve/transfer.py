@@ -14,7 +14,7 @@ from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.solve import transfer
-from wfluid.solve.multigrid import Level, Points
+from wfluid.solve.multigrid import Level, Location
 
 
 class Transfer:
@@ -50,7 +50,7 @@ class Transfer:
 class _Interpolation:
     """Linear interpolation of one component from a coarse to a fine grid, and its transpose."""
 
-    def __init__(self, fine: Layout, coarse: Layout, points: Points, device: wp.Device):
+    def __init__(self, fine: Layout, coarse: Layout, points: Location, device: wp.Device):
         self.fine, self.coarse, self.device = fine, coarse, device
         x, y = (
             _interpolation(n, m, rule, on_faces)
@@ -58,7 +58,7 @@ class _Interpolation:
                 (fine.nx, fine.ny), (coarse.nx, coarse.ny), points.rules, points.on_faces, strict=True
             )
         )
-        self.down = Collection(fine, coarse, _transposed(*x), _transposed(*y), device)
+        self.down = WeightedSums(fine, coarse, _transposed(*x), _transposed(*y), device)
         self.up_x, self.up_y = (_padded(axis[0] + HALO, axis[1], device) for axis in (x, y))
 
     def along_x(self, e: wp.array) -> None:
@@ -72,7 +72,7 @@ class _Interpolation:
         transfer.prolong_y_add.launch(self.fine, self.device, inputs, [out])
 
 
-class Collection:
+class WeightedSums:
     """Sums of at most 4 x 4 points of a fine grid with weights, for each point of a coarse one."""
 
     def __init__(self, fine: Layout, coarse: Layout, x: list[dict], y: list[dict], device: wp.Device):
@@ -114,7 +114,7 @@ class Averaging:
                 (fine.nx, fine.ny), (coarse.nx, coarse.ny), on_faces, periodic, strict=True
             )
         )
-        self._collection = Collection(fine, coarse, x, y, device)
+        self._collection = WeightedSums(fine, coarse, x, y, device)
 
     def average(self, f: wp.array, out: wp.array) -> None:
         """Out = the means of f, without ghosts."""

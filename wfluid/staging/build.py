@@ -14,27 +14,27 @@ from wfluid.domain.envelopes import Constant, product
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline, substeps_for
 from wfluid.files.points import read_points
-from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, particles_of
+from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, targets_of
 from wfluid.model.densities import Density, PaintedSource, Source
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import BlobForce, Force, Group, flat
+from wfluid.model.force import Force, Group, LocalForce, flatten
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.model.painted import Painted
 from wfluid.morphing.morph import FLOW
 from wfluid.morphing.morph import TOLERANCE as MORPH_TOLERANCE
 from wfluid.morphing.morph import VISCOSITY as MORPH_VISCOSITY
-from wfluid.morphing.settings import Course
+from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.color import linear_color
 from wfluid.pictures.formats import PictureError
-from wfluid.pictures.pairing import Pair, paired
+from wfluid.pictures.pairing import PicturePair, paired
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SchemaError
 from wfluid.staging.aims import Aims
 from wfluid.staging.drawing import Drawing
-from wfluid.staging.images import SAME_ASPECT, Paintings, named
-from wfluid.staging.timing import course
+from wfluid.staging.images import SAME_ASPECT, SceneImages, named
+from wfluid.staging.timing import envelope_and_scale
 
 KEYFRAME_STEPS = 48
 """Least steps a second of a scene with keyframes that does not say how many a frame has."""
@@ -60,9 +60,9 @@ class Staged:
     """Its animation, of a morph the flow."""
     aims: Aims | None = None
     """What it wants of its points, if it has keyframes."""
-    pair: Pair | None = None
+    pair: PicturePair | None = None
     """The pictures of a morph."""
-    course: Course | None = None
+    settings: MorphSettings | None = None
     """How a morph goes."""
 
 
@@ -77,7 +77,7 @@ def stage_all(
     """
     try:
         staged = _Stage(scene, note)
-        return Staged(staged.animation(device), staged.aims, staged.pair, staged.course)
+        return Staged(staged.animation(device), staged.aims, staged.pair, staged.settings)
     except SchemaError as error:
         raise scene.error(error) from error
 
@@ -93,10 +93,10 @@ class _Stage:
         self.loop = self.tables.get("time", {}).get("loop")
         picture = self.tables["picture"]
         self.picture = read_picture(scene.folder / picture["file"], picture.get("colorspace", "auto"))
-        self.paintings = Paintings(self.picture, scene.folder, note)
+        self.paintings = SceneImages(self.picture, scene.folder, note)
         self.drawing = self._drawing()
         self.pair = _at(("morph", "to"), self._pair) if self.morph else None
-        self.course = _at(("morph",), self._course) if self.morph else None
+        self.settings = _at(("morph",), self._morph_settings) if self.morph else None
         self.aims = _at(("keyframes",), self._aims) if "keyframes" in self.tables else None
 
     def animation(self, device: str | None) -> Animation:
@@ -123,10 +123,10 @@ class _Stage:
             )
 
         if self.loop:
-            _at(("time", "loop"), lambda: check_loop(self.loop, flat(forces)))
+            _at(("time", "loop"), lambda: check_loop(self.loop, flatten(forces)))
         return _at(("frames",), make)
 
-    def _pair(self) -> Pair:
+    def _pair(self) -> PicturePair:
         """The two pictures of a morph."""
         name = self.scene.folder / self.morph["to"]
         other = read_picture(name, self.tables["picture"].get("colorspace", "auto"))
@@ -136,7 +136,7 @@ class _Stage:
         _drawn_size(self.tables, "morph", other)
         return pair
 
-    def _course(self) -> Course:
+    def _morph_settings(self) -> MorphSettings:
         """How a morph goes."""
         given = {
             key: self.morph[key]
@@ -154,7 +154,7 @@ class _Stage:
             given["mask"] = named(name, lambda: Painted(self.paintings.paint(name)))
         elif "delay" in given:
             raise ValueError("delay needs a timing mask")
-        return Course(self.scene.timeline, **given)
+        return MorphSettings(self.scene.timeline, **given)
 
     def _place_in_b(self, what: str, place: list[float]) -> Place:
         """Where in the frame a point of a morph's second picture is seen [longer side]."""
@@ -227,7 +227,7 @@ class _Stage:
             side,
         )
         extent = drawing.width / side, drawing.height / side
-        particles_of(aims.keyframes, aims.pins, extent, timeline.end, side)
+        targets_of(aims.keyframes, aims.pins, extent, timeline.end, side)
         if self.loop:
             raise ValueError(f"a loop ({self.loop}) goes without keyframes: its end is its beginning")
         return aims
@@ -276,7 +276,7 @@ class _Stage:
     def _source(self, what: str, table: Mapping[str, Any]) -> Source | PaintedSource:
         """A source that pours its amount in all, over its window."""
         drawing = self.drawing
-        plain, _ = course(what, table, drawing.duration)
+        plain, _ = envelope_and_scale(what, table, drawing.duration)
         rate = table.get("amount", 1.0) / plain.integral(0.0, drawing.duration)
         envelope = drawing.modulated(what, plain, table)
         if "image" not in table:
@@ -303,7 +303,7 @@ class _Stage:
     def _note_small(self, n: int, force: Force) -> None:
         """Say where a force is smaller than a cell, whose motion then depends on where in it it lies."""
         cell = 1 / self.tables.get("fluid", {}).get("cells", 256)
-        if isinstance(force, BlobForce) and force.radius < cell:
+        if isinstance(force, LocalForce) and force.radius < cell:
             side = self.drawing.side
             self.note(
                 f"force.{n}: its radius of {force.radius * side:g} px is less than a cell of the fluid, "

@@ -26,8 +26,8 @@ from wfluid.model.painted import Freeze, Painted
 from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Buoyancy, Wind
 from wfluid.pictures.picture import resample
-from wfluid.staging.images import Paintings, named
-from wfluid.staging.timing import course, window
+from wfluid.staging.images import SceneImages, named
+from wfluid.staging.timing import envelope_and_scale, time_window
 
 DEFAULT_RADIUS = 0.06
 """Radius of a force that names none [longer side]."""
@@ -64,7 +64,7 @@ class Drawing:
     """Where forces act that name no mask."""
     frozen: Freeze | None = None
     """What stays where it is: no growth acts there."""
-    paintings: Paintings | None = None
+    paintings: SceneImages | None = None
     """Reads the pictures that forces name."""
 
     @property
@@ -118,9 +118,9 @@ class Drawing:
         """The radius of a spot [longer side]."""
         return table["radius"] / self.side if "radius" in table else DEFAULT_RADIUS
 
-    def course(self, what: str, table: Mapping[str, Any]) -> tuple[Envelope, float]:
+    def envelope_and_scale(self, what: str, table: Mapping[str, Any]) -> tuple[Envelope, float]:
         """The envelope, with those it names and its strength, and what carries a free particle by one."""
-        envelope, per_length = course(what, table, self.duration, self.scheme, self.loop)
+        envelope, per_length = envelope_and_scale(what, table, self.duration, self.scheme, self.loop)
         return self.modulated(what, envelope, table), per_length
 
     def modulated(self, what: str, envelope: Envelope, table: Mapping[str, Any]) -> Envelope:
@@ -153,14 +153,14 @@ class Drawing:
         return Path([row[0] for row in rows], [self.place(what, row[1:]) for row in rows])
 
     def _push(self, table: Mapping[str, Any]) -> GaussianForce:
-        envelope, per_length = self.course("push", table)
+        envelope, per_length = self.envelope_and_scale("push", table)
         vector = self._vector(table["by"], _PRESSURE * per_length)
         return GaussianForce(
             self.center("push", table), vector, self.radius(table), envelope, self._mask(table)
         )
 
     def _vortex(self, table: Mapping[str, Any]) -> VortexForce:
-        envelope, per_length = self.course("vortex", table)
+        envelope, per_length = self.envelope_and_scale("vortex", table)
         spin = math.radians(table["turn"]) * per_length
         return VortexForce(
             self.center("vortex", table), spin, self.radius(table), envelope, self._mask(table)
@@ -171,10 +171,10 @@ class Drawing:
         area, center = 2 * math.log(table["factor"]), self.center("grow", table)
         if "period" in table:
             table = {"phase": 0.25, **table}  # the cosine of the rate is the sine of the growth
-        envelope, _ = course("grow", table, self.duration, self.scheme, self.loop)
+        envelope, _ = envelope_and_scale("grow", table, self.duration, self.scheme, self.loop)
         if "period" in table:
             period, phase = table["period"], table["phase"]
-            start, end = window("grow", table, self.duration)
+            start, end = time_window("grow", table, self.duration)
             wave = Oscillator(period=period, phase=phase, start=start, end=end, centred=False)
             rate, envelope = area * 2 * math.pi / period, wave * _fade(table, start, end)
         else:
@@ -203,16 +203,16 @@ class Drawing:
                 raise ValueError(f"stroke: its path begins at {path.times[0]:g} s, after the animation")
         else:
             points = [self.place("stroke", at) for at in table["points"]]
-            path = Path.along(points, *window("stroke", table, self.duration))
+            path = Path.along(points, *time_window("stroke", table, self.duration))
         envelope = self.modulated("stroke", Constant(), {**table, "strength": 1.0})
         return Stroke(path, self.radius(table), table.get("strength", 1.0), envelope, self._mask(table))
 
     def _wind(self, table: Mapping[str, Any]) -> Wind:
-        envelope, per_length = self.course("wind", table)
+        envelope, per_length = self.envelope_and_scale("wind", table)
         return Wind(self._vector(table["by"], per_length), envelope, self._mask(table))
 
     def _noise(self, table: Mapping[str, Any]) -> NoiseForce:
-        envelope, per_length = self.course("noise", table)
+        envelope, per_length = self.envelope_and_scale("noise", table)
         return NoiseForce(
             strength=table["amount"] / self.side * per_length,
             scale=table["scale"] / self.side if "scale" in table else DEFAULT_SCALE,
@@ -225,7 +225,7 @@ class Drawing:
     def _image(self, table: Mapping[str, Any]) -> ImageForce:
         name, kind, paintings = table["file"], table.get("along", "gradient"), self.paintings
         weight = self._mask(table)
-        envelope, per_length = self.course(f"force image {name}", table)
+        envelope, per_length = self.envelope_and_scale(f"force image {name}", table)
         length = table["amount"] / self.side if "amount" in table else DEFAULT_LENGTH
         radius = table["radius"] / self.side if "radius" in table else DEFAULT_BLUR
         read = paintings.read if kind == "vectors" else paintings.paint
@@ -241,7 +241,7 @@ class Drawing:
         return force
 
     def _buoyancy(self, table: Mapping[str, Any]) -> Buoyancy:
-        envelope, per_length = self.course("buoyancy", table)
+        envelope, per_length = self.envelope_and_scale("buoyancy", table)
         return Buoyancy(table["density"], self._vector(table["by"], per_length), envelope)
 
     def envelope(self, what: str, table: Mapping[str, Any]) -> Envelope:

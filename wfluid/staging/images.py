@@ -28,7 +28,7 @@ SAME_ASPECT = 0.01
 
 
 @dataclass
-class Paintings:
+class SceneImages:
     """Reads paintings for one picture, and notes what a user should know of them."""
 
     picture: Picture

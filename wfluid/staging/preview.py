@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wfluid.animation.animation import Animation
-from wfluid.model.force import flat
+from wfluid.model.force import flatten
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture, resample
 from wfluid.scene.scene import Scene
@@ -37,7 +37,7 @@ def draw_controls(scene: Scene, animation: Animation, aims: Aims | None = None) 
     dark.
     """
     picture, fluid = animation.picture, animation.fluid
-    weights = {id(force.weight): force.weight for force in flat(animation.forces) if force.weight}
+    weights = {id(force.weight): force.weight for force in flatten(animation.forces) if force.weight}
     colours = _tinted(picture, fluid.viscosity, fluid.freeze, list(weights.values()))
     canvas = _Canvas(colours)
     frame_width, frame_height = scene.tables["picture"].get("size", (picture.width, picture.height))

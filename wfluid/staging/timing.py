@@ -13,7 +13,7 @@ from wfluid.domain.envelopes import Constant, Envelope, Fade, Instantaneous, Osc
 from wfluid.scene.format import LEAST_TIME
 
 
-def course(
+def envelope_and_scale(
     what: str, given: Mapping[str, Any], duration: float, scheme: str = "standard", loop: str | None = None
 ) -> tuple[Envelope, float]:
     """The envelope that keys say, and the acceleration (or velocity) that carries a free particle by one.
@@ -28,7 +28,7 @@ def course(
         if given["at"] >= duration:
             raise ValueError(f"{what} at={given['at']:g}: the animation lasts {duration:g} s")
         return Instantaneous(given["at"]), 1.0 / (duration - given["at"])
-    start, end = window(what, given, duration)
+    start, end = time_window(what, given, duration)
     envelope, per_length = _steady(given, start, end, scheme, loop)
     if given.get("rise") or given.get("fall"):
         try:
@@ -38,7 +38,7 @@ def course(
     return envelope, per_length
 
 
-def window(what: str, given: Mapping[str, Any], duration: float) -> tuple[float, float]:
+def time_window(what: str, given: Mapping[str, Any], duration: float) -> tuple[float, float]:
     """When a force begins and ends [s].
 
     Raises:

@@ -26,8 +26,8 @@ from wfluid.kernels.adjoint import viscosity as viscosity_adjoint
 from wfluid.kernels.cell.program import ADJOINT
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, together
-from wfluid.step.forcing import Impulses
-from wfluid.step.step import Stages
+from wfluid.step.forcing import Forcing
+from wfluid.step.step import Step
 
 
 class StepAdjoint:
@@ -37,7 +37,7 @@ class StepAdjoint:
     far as the diffusion is solved; with `effort` that of half the squares of what forces add.
     """
 
-    def __init__(self, stages: Stages, dt: float, of_viscosity: bool = False, effort: float = 0.0):
+    def __init__(self, stages: Step, dt: float, of_viscosity: bool = False, effort: float = 0.0):
         self.stages, self.device, self.layout = stages, stages.device, stages.layout
         load_kernels(stages.device, ADJOINT)
         self._effort = effort
@@ -73,7 +73,7 @@ class StepAdjoint:
         if self._moves:
             Ghosts(self.layout, self.stages.fluid.walls.centre_rules(), self.device).fold(self.mu_bar)
 
-    def reverse(self, state: State, impulses: Impulses, out_bar: State, bar: State) -> None:
+    def reverse(self, state: State, impulses: Forcing, out_bar: State, bar: State) -> None:
         """`bar` = the gradient with respect to `state`, from `out_bar`, that after the step from it.
 
         Gradients come without ghosts. Those of `out_bar` are written over.
@@ -99,7 +99,7 @@ class StepAdjoint:
             program = transport_adjoint.carried_along_adjoint
             program.launch(self.layout, self.device, inputs, outputs, turn=0)
 
-    def _solves(self, impulses: Impulses, out_bar: State, bar: State) -> Vector:
+    def _solves(self, impulses: Forcing, out_bar: State, bar: State) -> Vector:
         """Through projection, diffusion and the pressure kept: the gradient of the carried velocity."""
         stages = self.stages
         projected, carried = (out_bar.u, out_bar.v), self._projected_bar
@@ -165,7 +165,7 @@ class StepAdjoint:
                 out = [self._foot_bar[axis]]
                 advection_adjoint.foot_gradient.launch(self.layout, self.device, inputs, out)
 
-    def _push(self, pushed: Vector, state: State, impulses: Impulses, bar: State) -> None:
+    def _push(self, pushed: Vector, state: State, impulses: Forcing, bar: State) -> None:
         """Through the forces, with their effort."""
         velocity_bar = (bar.u, bar.v)
         if self._effort:
@@ -176,7 +176,7 @@ class StepAdjoint:
                 forces_adjoint.effort_added.launch(self.layout, self.device, inputs, [out])
         impulses.push_adjoint(velocity_bar, state, bar.rho)
 
-    def _densities(self, state: State, impulses: Impulses, out_bar: State, bar: State) -> None:
+    def _densities(self, state: State, impulses: Forcing, out_bar: State, bar: State) -> None:
         """Through the densities' diffusion, sources and transport."""
         stages, foot = self.stages, self._own_feet[0]
         for n, density in enumerate(stages.densities):
@@ -187,7 +187,7 @@ class StepAdjoint:
             for f, to in zip(foot, self._foot_bar, strict=True):
                 transport_adjoint.add.launch(self.layout, self.device, [f], [to])
 
-    def _trace(self, state: State, impulses: Impulses, out_bar: State, bar: State) -> None:
+    def _trace(self, state: State, impulses: Forcing, out_bar: State, bar: State) -> None:
         """Through the feet and the points, which both follow the velocity that the step begins with."""
         stages, layout, device, pitch = self.stages, self.layout, self.device, self.layout.pitch
         velocity, velocity_bar, centre_bar = (state.u, state.v), (bar.u, bar.v), self._centre_bar

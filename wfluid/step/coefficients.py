@@ -16,9 +16,9 @@ from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import stress
 from wfluid.kernels.step import transport
 from wfluid.model.fluid import Fluid
-from wfluid.model.painted import Painted, check_painted, value_on
+from wfluid.model.painted import Painted, check_painted, sample_at
 from wfluid.solve.multigrid import hierarchy
-from wfluid.solve.operators import MediumLevel
+from wfluid.solve.operators import CoefficientLevel
 from wfluid.solve.transfer import Averaging
 
 REACH = 3
@@ -37,10 +37,10 @@ class Stiffness:
     """Largest ratio of row sums within `REACH` cells."""
 
 
-class Medium:
+class Coefficients:
     """A fluid's viscosity and drag on every grid of the hierarchy; a coarse cell has the mean of its cells.
 
-    The finest grid follows the fluid through time (`follow`) or the picture (`carry`); `spread` brings
+    The finest grid follows the fluid through time (`set_time`) or the picture (`carry`); `coarsen` brings
     the others up to date.
     """
 
@@ -48,7 +48,7 @@ class Medium:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.size = (grid.width, grid.height)
         grids = hierarchy(grid.nx, grid.ny, self.size)
-        self.levels = [MediumLevel(*cells, fluid.walls, device) for cells in grids]
+        self.levels = [CoefficientLevel(*cells, fluid.walls, device) for cells in grids]
         pairs = [(fine.layout, coarse.layout) for fine, coarse in pairwise(self.levels)]
         self._means = [Averaging(*pair, device) for pair in pairs]
         self._face_means = [
@@ -61,12 +61,14 @@ class Medium:
         self._dt = wp.zeros(1, dtype=Real, device=device)
         self._now: tuple[float, float] | None = None
         top = self.levels[0]
-        self._painted = MediumLevel(grid.nx, grid.ny, fluid.walls, device) if fluid.viscosity_moves else top
+        self._painted = (
+            CoefficientLevel(grid.nx, grid.ny, fluid.walls, device) if fluid.viscosity_moves else top
+        )
         self.mu = np.zeros((grid.ny, grid.nx))
-        self.alpha = fluid.freeze.on(grid) if fluid.freeze else np.zeros((grid.ny, grid.nx))
+        self.alpha = fluid.freeze.sample(grid) if fluid.freeze else np.zeros((grid.ny, grid.nx))
         from_numpy(self.alpha, top.alpha, top.layout)
 
-    def follow(self, t: float, dt: float) -> bool:
+    def set_time(self, t: float, dt: float) -> bool:
         """Take the viscosity at time t and the step dt; whether anything changed.
 
         Raises:
@@ -88,17 +90,17 @@ class Medium:
         Raises:
             ValueError: it is negative, not finite or above the limit.
         """
-        mu = value_on(self.fluid.viscosity, self.grid, t)
+        mu = sample_at(self.fluid.viscosity, self.grid, t)
         check_painted(mu)
         return np.broadcast_to(mu, self.mu.shape)
 
-    def expect(self, times: Sequence[float], dt: float) -> None:
+    def bound_over(self, times: Sequence[float], dt: float) -> None:
         """Let the bounds of `stiffness` hold for the viscosity at all these times, and steps of dt.
 
         Raises:
             ValueError: as `at`.
         """
-        self.forget()
+        self.invalidate()
         self._dt.assign([dt])
         self.mu = self.at(times[0])
         for t in times[1:]:
@@ -108,8 +110,8 @@ class Medium:
         """Fill the ghosts of the viscosity where it is painted: launches only."""
         self._painted.fill()
 
-    def forget(self) -> None:
-        """Have the next `follow` begin anew."""
+    def invalidate(self) -> None:
+        """Have the next `set_time` begin anew."""
         self._now = None
 
     @property
@@ -128,7 +130,7 @@ class Medium:
         inputs = [painted.mu, state.d_x, state.d_y, *where(self.grid, self.fluid.walls, layout)]
         transport.carried_along.launch(layout, self.device, inputs, [self.levels[0].mu])
 
-    def spread(self) -> None:
+    def coarsen(self) -> None:
         """Bring every level up to date with the finest: launches only."""
         top = self.levels[0]
         top.fill()

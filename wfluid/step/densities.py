@@ -18,26 +18,26 @@ from wfluid.kernels.solve import sums
 from wfluid.kernels.step import sources, transport
 from wfluid.model.densities import Density, PaintedSource, Source
 from wfluid.model.fluid import Fluid
-from wfluid.solve.multigrid import Points
-from wfluid.solve.system import Solve
+from wfluid.solve.multigrid import Location
+from wfluid.solve.system import SolveMethod
 from wfluid.step.diffusion import ScalarDiffusion
-from wfluid.step.gaussians import Blobs
+from wfluid.step.gaussians import GaussianBatch
 
 
-class Pouring:
+class DensitySources:
     """The sources of one density."""
 
     def __init__(self, density: Density, grid: Grid, walls: Walls, device: wp.Device, gradients: bool):
         self.device, self.layout = device, Layout(grid.nx, grid.ny)
         self._round = [n for n, source in enumerate(density.sources) if isinstance(source, Source)]
-        self.blobs = Blobs(len(self._round), grid, walls, device, gradients) if self._round else None
+        self.blobs = GaussianBatch(len(self._round), grid, walls, device, gradients) if self._round else None
         self._painted = [n for n, source in enumerate(density.sources) if isinstance(source, PaintedSource)]
         self._fields = [field(self.layout, device) for _ in self._painted]
         for n, f in zip(self._painted, self._fields, strict=True):
-            from_numpy(density.sources[n].paint.on(grid), f, self.layout)
+            from_numpy(density.sources[n].paint.sample(grid), f, self.layout)
         self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
 
-    blobs: Blobs | None
+    blobs: GaussianBatch | None
     """The round sources."""
 
     @property
@@ -54,10 +54,10 @@ class Pouring:
         return [density.sources[n].envelope.integral(start, end) for n in self._painted]
 
     def row(self, density: Density, start: float, end: float, live: bool) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers and boxes of the round sources; `live` as for `Impulses.row`."""
+        """The numbers and boxes of the round sources; `live` as for `Forcing.row`."""
         poured = [density.sources[n] for n in self._round]
         alive = [live and source.envelope.acts(start, end) for source in poured]
-        return self.blobs.row([source.over(start, end) for source in poured], alive)
+        return self.blobs.row([source.impulse(start, end) for source in poured], alive)
 
     def add(self, rho: wp.array) -> None:
         """Add what they pour to the density, in place: launches only."""
@@ -97,9 +97,9 @@ class DensityTransport:
         self._ghosts = Ghosts(self.layout, rules, device)
         self._diffusion = None
         if density.diffusion:
-            self._diffusion = ScalarDiffusion(grid, fluid, Points(rules), device, conserved=True)
+            self._diffusion = ScalarDiffusion(grid, fluid, Location(rules), device, conserved=True)
         self._carried = field(self.layout, device)
-        self._initial = None if density.initial is None else density.initial.on(grid)
+        self._initial = None if density.initial is None else density.initial.sample(grid)
 
     def begin(self, rho: wp.array) -> None:
         """Give a density its initial values."""
@@ -107,9 +107,11 @@ class DensityTransport:
             from_numpy(self._initial, rho, self.layout)
             self._ghosts.fill(rho)
 
-    def plan(self, dt: float) -> Solve:
+    def plan(self, dt: float) -> SolveMethod:
         """Make ready for steps of dt; what the diffusion's solve will be."""
-        return self._diffusion.plan(dt * self.density.diffusion) if self._diffusion else Solve("none", 0)
+        return (
+            self._diffusion.plan(dt * self.density.diffusion) if self._diffusion else SolveMethod("none", 0)
+        )
 
     def _diffuses(self) -> bool:
         return bool(self._diffusion and self._diffusion.how.iterations)

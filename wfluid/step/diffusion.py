@@ -16,10 +16,10 @@ from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, together
 from wfluid.kernels.solve import algebra, sums
 from wfluid.model.fluid import Fluid
-from wfluid.solve.multigrid import Points, hierarchy
-from wfluid.solve.operators import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, Stress
-from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, Solve, conjugate_gradients
-from wfluid.step.coefficients import Medium
+from wfluid.solve.multigrid import Location, hierarchy
+from wfluid.solve.operators import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, ViscousStress
+from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, SolveMethod, conjugate_gradients
+from wfluid.step.coefficients import Coefficients
 
 SURE_TOLERANCE = 1e-4
 """Tolerance from which on the coupled equation is solved by conjugate gradients, which know when they are
@@ -34,7 +34,9 @@ class ScalarDiffusion:
     change is taken off evenly.
     """
 
-    def __init__(self, grid: Grid, fluid: Fluid, points: Points, device: wp.Device, conserved: bool = False):
+    def __init__(
+        self, grid: Grid, fluid: Fluid, points: Location, device: wp.Device, conserved: bool = False
+    ):
         self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
         self._conserved = conserved
         if conserved:
@@ -44,16 +46,16 @@ class ScalarDiffusion:
         size = (grid.width, grid.height)
         levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
         self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL)
-        self.how = Solve("none", 0)
+        self.how = SolveMethod("none", 0)
         self._change, self._answer = (vector(self.layout, device, 1) for _ in range(2))
         self._one = wp.array([1.0], dtype=Real, device=device)
         self._dt_mu = -1.0
 
-    def plan(self, dt_mu: float) -> Solve:
+    def plan(self, dt_mu: float) -> SolveMethod:
         """Make ready for steps of dt times mu; what the solve will be, "none" where nothing diffuses."""
         if dt_mu == self._dt_mu:
             return self.how
-        self.how = Solve("none", 0)
+        self.how = SolveMethod("none", 0)
         if dt_mu > 0:
             for level in self.system.levels:
                 level.set_coefficients(1.0, dt_mu)
@@ -63,9 +65,9 @@ class ScalarDiffusion:
         self._dt_mu = dt_mu
         return self.how
 
-    def _choose(self) -> Solve:
+    def _choose(self) -> SolveMethod:
         if self.fluid.solver == "jacobi":
-            return Solve("jacobi", self.fluid.sweeps)
+            return SolveMethod("jacobi", self.fluid.sweeps)
         top, tolerance = self.system.levels[0], self.fluid.diffusion_tolerance
         sweeps = self.system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
         return sweeps or self.system.plan_cycles(tolerance)
@@ -120,16 +122,16 @@ class SeparateDiffusion:
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
         self.fluid, walls = fluid, fluid.walls
-        points = (Points(walls.u_rules(), (True, False)), Points(walls.v_rules(), (False, True)))
+        points = (Location(walls.u_rules(), (True, False)), Location(walls.v_rules(), (False, True)))
         self.components = [ScalarDiffusion(grid, fluid, own, device) for own in points]
         self.out = vector(Layout(grid.nx, grid.ny), device, 2)
 
     @property
-    def how(self) -> Solve:
+    def how(self) -> SolveMethod:
         """How both are solved."""
         return self.components[0].how
 
-    def plan(self, dt: float) -> Solve:
+    def plan(self, dt: float) -> SolveMethod:
         """Make ready for steps of dt; what the solve will be, "none" where nothing diffuses."""
         for component in self.components:
             component.plan(dt * self.fluid.viscosity)
@@ -158,24 +160,24 @@ class SeparateDiffusion:
 class CoupledDiffusion:
     """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
 
-    def __init__(self, fluid: Fluid, medium: Medium, device: wp.Device, jump_tolerance: float = 1.0):
+    def __init__(self, fluid: Fluid, medium: Coefficients, device: wp.Device, jump_tolerance: float = 1.0):
         self._jump_tolerance = jump_tolerance
         self.fluid, self.medium, self.device = fluid, medium, device
         self.layout = medium.levels[0].layout
-        levels = [Stress(level, medium.size, fluid.walls, device) for level in medium.levels]
+        levels = [ViscousStress(level, medium.size, fluid.walls, device) for level in medium.levels]
         self.system = LinearSystem(levels, device, STRESS_INTERVAL)
-        self.how = Solve("none", 0)
+        self.how = SolveMethod("none", 0)
         self.out, self._start, self._change, self._answer = (vector(self.layout, device, 2) for _ in range(4))
         self._one = wp.array([1.0], dtype=Real, device=device)
 
-    def plan(self, dt: float) -> Solve:
+    def plan(self, dt: float) -> SolveMethod:
         """Take the step and the medium's bounds; what the solve will be. `prepare` must follow."""
         stiffness, tolerance = self.medium.stiffness(dt), self.fluid.diffusion_tolerance
         self._norm = stiffness.greatest
         for depth, level in enumerate(self.system.levels):
             level.set_step(dt, 0.0 if depth else stiffness.least)
         if self.fluid.solver == "jacobi":
-            self.how = Solve("jacobi", self.fluid.sweeps)
+            self.how = SolveMethod("jacobi", self.fluid.sweeps)
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.how = sweeps
         elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:

@@ -19,18 +19,18 @@ from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import algebra, sums
 from wfluid.kernels.step import forces
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import FORCE_LIMIT, BlobForce, FieldForce, Force
+from wfluid.model.force import FORCE_LIMIT, FieldForce, Force, LocalForce
 from wfluid.model.gaussian_forces import STEP_GROWTH, Growth
 from wfluid.model.painted import Painted
 from wfluid.model.uniform_forces import Buoyancy
-from wfluid.step.densities import Pouring
-from wfluid.step.gaussians import Growths, Pushes
+from wfluid.step.densities import DensitySources
+from wfluid.step.gaussians import GaussianForces, GrowthSources
 
 _STEP = 5
 """Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
 
 
-class Impulses:
+class Forcing:
     """The numbers of a step with forces of certain kinds, and how they move the fluid.
 
     Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too.
@@ -43,8 +43,8 @@ class Impulses:
         self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
         walls, make = fluid.walls, (grid, fluid.walls, device, gradients)
         pushes, growths = _by_weight(self._forces)
-        self._pushes = [Pushes(*group, *make) for group in pushes]
-        self._growths = [Growths(*group, *make) for group in growths]
+        self._pushes = [GaussianForces(*group, *make) for group in pushes]
+        self._growths = [GrowthSources(*group, *make) for group in growths]
         self._fields: list[tuple[int, Vector]] = []
         self._lifts: list[tuple[int, int]] = []
         for n, force in enumerate(forces):
@@ -52,7 +52,7 @@ class Impulses:
                 self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
             elif isinstance(force, Buoyancy):
                 self._lifts.append((n, _index_of(force.density, fluid.density_names)))
-        self._pourings = [Pouring(density, *make) for density in fluid.densities]
+        self._pourings = [DensitySources(density, *make) for density in fluid.densities]
         self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
         self._lifted = field(self.layout, device) if self._lifts and gradients else None
         self._rows = wp.zeros(2 * grid.ny, dtype=Real, device=device)
@@ -104,7 +104,7 @@ class Impulses:
     def key(forces: Sequence[Force]) -> tuple:
         """What impulses are made for: forces of one key differ in numbers only."""
         return tuple(
-            (isinstance(f, Growth), id(f.weight)) if isinstance(f, BlobForce) else (id(f),) for f in forces
+            (isinstance(f, Growth), id(f.weight)) if isinstance(f, LocalForce) else (id(f),) for f in forces
         )
 
     @property
@@ -155,7 +155,9 @@ class Impulses:
         Raises:
             ValueError: a force that would add more than the limit, with the force and the limit.
         """
-        blobs = {n: force.over(t, until) for n, force in enumerate(forces) if isinstance(force, BlobForce)}
+        blobs = {
+            n: force.impulse(t, until) for n, force in enumerate(forces) if isinstance(force, LocalForce)
+        }
         for blob in blobs.values():
             if abs(blob.swell) * dt > STEP_GROWTH:
                 raise ValueError(
@@ -258,8 +260,8 @@ class Impulses:
     def gradients(self, numbers: np.ndarray, bars: np.ndarray) -> dict[int, np.ndarray]:
         """The gradients with respect to what each force does, from rows of `numbers` and `bars`, one a step.
 
-        By the force's number, (steps, n): of a Gaussian the numbers that `blobs.blob_of` knows, of a field
-        its integrals, of a buoyancy its two impulses.
+        By the force's number, (steps, n): of a Gaussian the numbers that `gaussian_impulse_of` knows, of a
+        field its integrals, of a buoyancy its two impulses.
         """
         found: dict[int, np.ndarray] = {}
         for group in self._groups:
@@ -288,7 +290,7 @@ def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
     """The weights of Gaussian pushes, and of growths, each with the numbers of its forces."""
     found: tuple[dict, dict] = {}, {}
     for n, force in enumerate(forces):
-        if isinstance(force, BlobForce):
+        if isinstance(force, LocalForce):
             groups = found[isinstance(force, Growth)]
             groups.setdefault(id(force.weight), (force.weight, []))[1].append(n)
     return list(found[0].values()), list(found[1].values())

@@ -17,7 +17,7 @@ from wfluid.kernels.cell.real import Indices, Real
 from wfluid.kernels.cell.strips import alone
 from wfluid.kernels.solve import algebra, sums
 from wfluid.kernels.step import forces, sources
-from wfluid.model.force import Blob
+from wfluid.model.force import GaussianImpulse
 from wfluid.model.painted import Painted
 
 _NUMBERS = 8
@@ -27,13 +27,13 @@ _FIELDS = 2
 """Fields that moments are taken of: a velocity has two."""
 
 
-def blob_of(row: Sequence[float]) -> Blob:
+def gaussian_impulse_of(row: Sequence[float]) -> GaussianImpulse:
     """The numbers of one Gaussian, or the gradients with respect to them, in words."""
     center_x, center_y, radius, push_x, push_y, turn, swell, amount = map(float, row)
-    return Blob((center_x, center_y), radius, (push_x, push_y), turn, swell, amount)
+    return GaussianImpulse((center_x, center_y), radius, (push_x, push_y), turn, swell, amount)
 
 
-class Blobs:
+class GaussianBatch:
     """A number of Gaussians whose places, sizes and strengths change from step to step.
 
     What they are in a step is a row of numbers and one of boxes, which `row` finds and `bind` says where on
@@ -44,8 +44,8 @@ class Blobs:
         self.count, self.device, self.layout = count, device, Layout(grid.nx, grid.ny)
         self.numbers, self.boxes = _NUMBERS * count, 4 * count
         self.moments = _FIELDS * forces_adjoint.MOMENTS * count if gradients else 0
-        self._x = _Axis(count, grid.nx, grid.hx, grid.width * walls.periodic[0], device)
-        self._y = _Axis(count, grid.ny, grid.hy, grid.height * walls.periodic[1], device)
+        self._x = _Profiles(count, grid.nx, grid.hx, grid.width * walls.periodic[0], device)
+        self._y = _Profiles(count, grid.ny, grid.hy, grid.height * walls.periodic[1], device)
         if gradients:
             self._sums = wp.zeros(forces_adjoint.ORDERS * count * grid.ny, dtype=Real, device=device)
 
@@ -67,7 +67,9 @@ class Blobs:
             size = self.moments // _FIELDS
             self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS)]
 
-    def row(self, blobs: Sequence[Blob], live: Sequence[bool] = ()) -> tuple[np.ndarray, np.ndarray]:
+    def row(
+        self, blobs: Sequence[GaussianImpulse], live: Sequence[bool] = ()
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The numbers and the boxes of what they do in a step.
 
         Those that are `live` act even where their strengths are 0, for the gradients with respect to these.
@@ -188,7 +190,7 @@ class Blobs:
         return self._x.at_centres, self._y.at_centres
 
 
-class _Axis:
+class _Profiles:
     """Profiles along one axis: distances [radii] and Gaussians, at faces and at centres, blob by blob."""
 
     def __init__(self, count: int, points: int, h: float, period: float, device: wp.Device):
@@ -214,7 +216,7 @@ class _Moments:
         return self(2, 0) + self(0, 2)
 
 
-class _Gaussians:
+class _Weighted:
     """Forces `members`, counted among all, with one weight."""
 
     def __init__(
@@ -227,15 +229,15 @@ class _Gaussians:
         gradients: bool,
     ):
         self.members, self.device, self.layout = members, device, Layout(grid.nx, grid.ny)
-        self.blobs = Blobs(len(members), grid, walls, device, gradients)
+        self.blobs = GaussianBatch(len(members), grid, walls, device, gradients)
         self._weights = None
         if weight is not None:
             self._weights = field(self.layout, device)
-            from_numpy(weight.on(grid), self._weights, self.layout)
+            from_numpy(weight.sample(grid), self._weights, self.layout)
             Ghosts(self.layout, walls.centre_rules(), device).fill(self._weights)
 
 
-class Pushes(_Gaussians):
+class GaussianForces(_Weighted):
     """Gaussian forces with one weight."""
 
     def __init__(self, *arguments):
@@ -267,7 +269,7 @@ class Pushes(_Gaussians):
         return self.blobs.push_gradient(numbers, moments)
 
 
-class Growths(_Gaussians):
+class GrowthSources(_Weighted):
     """Growths with one weight: their divergence is a field first, of which the mean is taken off."""
 
     def __init__(self, *arguments):

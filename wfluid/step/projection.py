@@ -15,10 +15,10 @@ from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import projection
 from wfluid.model.fluid import Fluid
-from wfluid.solve.multigrid import Points, hierarchy
-from wfluid.solve.operators import FIVE_POINT_INTERVAL, FivePoint, Resisted
-from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, Solve, conjugate_gradients
-from wfluid.step.coefficients import Medium
+from wfluid.solve.multigrid import Location, hierarchy
+from wfluid.solve.operators import FIVE_POINT_INTERVAL, FivePoint, VariablePoisson
+from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, SolveMethod, conjugate_gradients
+from wfluid.step.coefficients import Coefficients
 
 
 class Projection:
@@ -28,7 +28,7 @@ class Projection:
         self,
         grid: Grid,
         fluid: Fluid,
-        medium: Medium | None,
+        medium: Coefficients | None,
         device: wp.Device,
         jump_tolerance: float = 1.0,
     ):
@@ -36,16 +36,16 @@ class Projection:
         self.fluid, self.medium, self.device, self.layout = fluid, medium, device, Layout(grid.nx, grid.ny)
         size, walls = (grid.width, grid.height), fluid.walls
         if medium:
-            levels = [Resisted(level, size, walls, device) for level in medium.levels]
+            levels = [VariablePoisson(level, size, walls, device) for level in medium.levels]
         else:
-            points = Points(walls.centre_rules())
+            points = Location(walls.centre_rules())
             levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
             for level in levels:
                 level.set_coefficients(0.0, 1.0)
         self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL, singular=True)
-        self.how = Solve("multigrid", fluid.pressure_cycles)
+        self.how = SolveMethod("multigrid", fluid.pressure_cycles)
         if fluid.solver == "jacobi":
-            self.how = Solve("jacobi", fluid.sweeps)
+            self.how = SolveMethod("jacobi", fluid.sweeps)
         if not medium:
             self.prepare()
         self.system.prepare(self.how)
@@ -54,13 +54,13 @@ class Projection:
         self._inverse_h = [numbers[0:1], numbers[1:2]]
         self._resisted = vector(self.layout, device, 2) if medium else ()
 
-    def plan(self, dt: float) -> Solve:
+    def plan(self, dt: float) -> SolveMethod:
         """Choose the solve for the medium's drag and steps of dt. `prepare` must follow."""
         if self.medium and self.fluid.solver != "jacobi":
             if self.medium.drag_jump(dt) > JUMP_LIMIT:
                 self.how = conjugate_gradients(min(self.fluid.pressure_tolerance, self._jump_tolerance))
             else:
-                self.how = Solve("multigrid", self.fluid.pressure_cycles)
+                self.how = SolveMethod("multigrid", self.fluid.pressure_cycles)
             self.system.prepare(self.how)
         return self.how
 

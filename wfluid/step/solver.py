@@ -14,14 +14,14 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import STEP_LIMIT
 from wfluid.fields.arrays import from_numpy
 from wfluid.fields.device import load_kernels
-from wfluid.fields.graph import Replay, exclusive
+from wfluid.fields.graph import CapturedGraph, exclusive
 from wfluid.fields.state import State
 from wfluid.kernels.cell.layout import Layout
 from wfluid.model.fluid import Fluid
-from wfluid.model.force import Force, Group, flat
+from wfluid.model.force import Force, Group, flatten
 from wfluid.solve.system import Residual
-from wfluid.step.forcing import Impulses
-from wfluid.step.step import Stages
+from wfluid.step.forcing import Forcing
+from wfluid.step.step import Step
 
 REPLAYS_KEPT = 16
 """Pairs of states whose steps are kept captured; the oldest goes first."""
@@ -57,12 +57,12 @@ class Solver:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        self._stages = Stages(grid, fluid, device)
+        self._stages = Step(grid, fluid, device)
         self._last_dt = 0.0
-        self._preparation: Replay | None = None
-        self._impulses: dict[tuple, Impulses] = {}
-        self._last_impulses: Impulses | None = None
-        self._replays: dict[tuple, tuple[Replay, State, State, Impulses]] = {}
+        self._preparation: CapturedGraph | None = None
+        self._impulses: dict[tuple, Forcing] = {}
+        self._last_impulses: Forcing | None = None
+        self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
         self._pool = self._stages.helpers()
 
     @exclusive
@@ -130,10 +130,10 @@ class Solver:
             raise ValueError("a step cannot write the state it reads")
         self._check(state_in, state_out)
         until = t + dt if until is None else until
-        self._replay_for(state_in, state_out, flat(forces), t, dt, until).launch()
+        self._graph_for(state_in, state_out, flatten(forces), t, dt, until).launch()
 
     @exclusive
-    def _replay_for(
+    def _graph_for(
         self,
         state_in: State,
         state_out: State,
@@ -141,7 +141,7 @@ class Solver:
         t: float,
         dt: float,
         until: float,
-    ) -> Replay:
+    ) -> CapturedGraph:
         """The step, captured at first, with its numbers put where it reads them."""
         stages, impulses = self._stages, self._impulses_for(forces)
         last = self._last_impulses
@@ -152,7 +152,7 @@ class Solver:
         key = (id(state_in), id(state_out), id(impulses), plan)
         if key not in self._replays:
             work = partial(stages.advance, state_in, state_out, impulses)
-            replay = Replay(self.device, work, self._pool)
+            replay = CapturedGraph(self.device, work, self._pool)
             self._replays[key] = (replay, state_in, state_out, impulses)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
@@ -162,7 +162,7 @@ class Solver:
     def _prepare(self) -> None:
         """Bring what depends on the medium up to date."""
         if self._preparation is None:
-            self._preparation = Replay(self.device, self._stages.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self._stages.follow_medium, self._pool)
         self._preparation.launch()
 
     @exclusive
@@ -202,7 +202,7 @@ class Solver:
         stages = self._ready(state_in, 0.0, dt)
         stages.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
-    def _ready(self, state: State, t: float, dt: float) -> Stages:
+    def _ready(self, state: State, t: float, dt: float) -> Step:
         """The stages, ready for one of them alone."""
         self._stages.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
@@ -220,10 +220,10 @@ class Solver:
                     f"{len(self._stages.densities)} and {len(states[0].p_x)}"
                 )
 
-    def _impulses_for(self, forces: Sequence[Force]) -> Impulses:
-        key = Impulses.key(forces)
+    def _impulses_for(self, forces: Sequence[Force]) -> Forcing:
+        key = Forcing.key(forces)
         if key not in self._impulses:
             if len(self._impulses) >= REPLAYS_KEPT:
                 del self._impulses[next(iter(self._impulses))]
-            self._impulses[key] = Impulses(forces, self.fluid, self.grid, self.device)
+            self._impulses[key] = Forcing(forces, self.fluid, self.grid, self.device)
         return self._impulses[key]

@@ -27,12 +27,12 @@ from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.step import advection, projection, transport
 from wfluid.model.fluid import Fluid
-from wfluid.step.coefficients import Medium
+from wfluid.step.coefficients import Coefficients
 from wfluid.step.densities import DensityTransport
 from wfluid.step.diffusion import CoupledDiffusion, SeparateDiffusion
-from wfluid.step.forcing import Impulses
+from wfluid.step.forcing import Forcing
 from wfluid.step.projection import Projection
-from wfluid.system.threads import Helpers, free_cores, helpers
+from wfluid.system.threads import ThreadTeam, free_cores, helpers
 
 STRIPS = 2
 """Threads that share a step on a CPU: more wait for memory."""
@@ -47,7 +47,7 @@ COUPLED_WORK = 4
 """Times as much work that a coupled diffusion makes of a step."""
 
 
-class Stages:
+class Step:
     """A step's stages and what they work with. They only launch, so that a graph may capture them.
 
     Conjugate gradients go to the fluid's tolerances, or to `jump_tolerance` where that is lower.
@@ -61,10 +61,11 @@ class Stages:
             Ghosts(self.layout, rules, device) for rules in (walls.u_rules(), walls.v_rules())
         ]
         self.moved_ghosts = [
-            Ghosts(self.layout, rules, device) for rules in (walls.moved_x_rules(), walls.moved_y_rules())
+            Ghosts(self.layout, rules, device)
+            for rules in (walls.displacement_x_rules(), walls.displacement_y_rules())
         ]
         self.where = where(grid, walls, self.layout)
-        self.medium = None if fluid.separable else Medium(grid, fluid, device)
+        self.medium = None if fluid.separable else Coefficients(grid, fluid, device)
         self.diffusion = (
             CoupledDiffusion(fluid, self.medium, device, jump_tolerance)
             if self.medium
@@ -82,7 +83,7 @@ class Stages:
     pushed: Vector
     """The velocity after forces, with ghosts; later without the pressure so far."""
 
-    def advance(self, state_in: State, state_out: State, impulses: Impulses) -> None:
+    def advance(self, state_in: State, state_out: State, impulses: Forcing) -> None:
         """The step: launches only."""
         if self.fluid.viscosity_moves:
             self.follow_medium(state_in)
@@ -105,9 +106,9 @@ class Stages:
         self.fluid = self.diffusion.fluid = fluid
         if self.medium:
             self.medium.fluid = fluid
-            self.medium.forget()
+            self.medium.invalidate()
 
-    def helpers(self, alone: bool = False) -> Helpers | None:
+    def helpers(self, alone: bool = False) -> ThreadTeam | None:
         """The threads that share the launches of a step beside the calling one, where that gains.
 
         It gains earlier where the process is `alone`, has no other work to do meanwhile.
@@ -126,13 +127,13 @@ class Stages:
         medium = self.medium
         if not medium:
             return self.diffusion.plan(dt), self.projection.how, *densities
-        if medium.follow(t, dt):
+        if medium.set_time(t, dt):
             try:
                 self._solves = self.diffusion.plan(dt), self.projection.plan(dt)
                 if not self.fluid.viscosity_moves:
                     prepare()
             except BaseException:
-                medium.forget()  # half done
+                medium.invalidate()  # half done
                 raise
         return *self._solves, *densities
 
@@ -159,12 +160,12 @@ class Stages:
         """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""
         if state:
             self.medium.carry(state)
-        self.medium.spread()
+        self.medium.coarsen()
         self.diffusion.prepare()
         if self.fluid.freeze:
             self.projection.prepare()
 
-    def trace(self, state: State, impulses: Impulses) -> None:
+    def trace(self, state: State, impulses: Forcing) -> None:
         """Find the feet of all centres."""
         trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
         inputs = [state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
@@ -173,7 +174,7 @@ class Stages:
             for f, ghosts in zip(self.foot, self.moved_ghosts, strict=True):
                 ghosts.fill(f)
 
-    def push(self, state: State, impulses: Impulses) -> Vector:
+    def push(self, state: State, impulses: Forcing) -> Vector:
         """The velocity after forces, with ghosts."""
         if not impulses.pushes:
             return state.u, state.v
@@ -191,12 +192,12 @@ class Stages:
             for d, ghosts in zip((state_out.d_x, state_out.d_y), self.moved_ghosts, strict=True):
                 ghosts.fill(d)
 
-    def carry_densities(self, state_in: State, state_out: State, impulses: Impulses) -> None:
+    def carry_densities(self, state_in: State, state_out: State, impulses: Forcing) -> None:
         """The densities a step later, with what their sources pour."""
         for n, (density, rho) in enumerate(zip(self.densities, state_in.rho, strict=True)):
             density.advance(rho, self.foot, self.where, partial(impulses.pour, n), state_out.rho[n])
 
-    def carry_points(self, state_in: State, state_out: State, impulses: Impulses) -> None:
+    def carry_points(self, state_in: State, state_out: State, impulses: Forcing) -> None:
         """The points a step later."""
         state = state_in
         inputs = [state.p_x, state.p_y, state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
@@ -214,7 +215,7 @@ class Stages:
         self.fill(self._carried)
         return self._carried
 
-    def subtract_pressure(self, velocity: Vector, state: State, impulses: Impulses) -> Vector:
+    def subtract_pressure(self, velocity: Vector, state: State, impulses: Forcing) -> Vector:
         """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
         if not self.medium:
             return velocity

@@ -11,7 +11,7 @@ _PART = ".part"
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def atomic_file(path: Path) -> Iterator[Path]:
     """A temporary name in the same folder, renamed to `path` on success and removed on failure."""
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{_PART}{path.suffix}")
     try:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 
-class Helpers:
+class ThreadTeam:
     """The threads beside the calling one. A forked process, which inherits none, gets its own."""
 
     count: int
@@ -24,9 +24,9 @@ class Helpers:
         return self._pool.submit(work, *arguments)
 
 
-def helpers(threads: int) -> Helpers | None:
+def helpers(threads: int) -> ThreadTeam | None:
     """The helpers for so many threads; None where the calling one is alone."""
-    return Helpers(threads - 1) if threads > 1 else None
+    return ThreadTeam(threads - 1) if threads > 1 else None
 
 
 def free_cores() -> int:

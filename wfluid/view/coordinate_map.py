@@ -51,7 +51,7 @@ class CoordinateMap:
         weights, near = _catmull_rom(at - first), HALO + np.arange(-1, 3)
         found = places.copy()
         for component, (rule_x, rule_y) in enumerate(
-            (self.walls.moved_x_rules(), self.walls.moved_y_rules())
+            (self.walls.displacement_x_rules(), self.walls.displacement_y_rules())
         ):
             columns, signs_x = (a[first[:, :1] + near] for a in ghost_table(grid.nx, rule_x))
             rows, signs_y = (a[first[:, 1:] + near] for a in ghost_table(grid.ny, rule_y))

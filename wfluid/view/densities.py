@@ -14,7 +14,7 @@ DARKEST = 1e-3
 """Least part of the light that ink of density 1 lets through: a colour of 0 would let none through any."""
 
 
-def stretched(
+def upsample(
     values: np.ndarray, width: int, height: int, periodic: tuple[bool, bool] = (False, False)
 ) -> np.ndarray:
     """Values (ny, nx) at cells' centres as (height, width): by cubic B-splines, smooth and within range."""
@@ -39,7 +39,7 @@ def _splines(cells: int, pixels: int, periodic: bool) -> np.ndarray:
     return matrix
 
 
-def show_densities(
+def composite_densities(
     picture: Picture,
     densities: Sequence[Density],
     values: Sequence[np.ndarray],
@@ -54,7 +54,7 @@ def show_densities(
     for density, rho in zip(densities, values, strict=True):
         if rho.max() <= 0:
             continue
-        amount = stretched(np.maximum(rho, 0.0), picture.width, picture.height, periodic)
+        amount = upsample(np.maximum(rho, 0.0), picture.width, picture.height, periodic)
         pixels = pixels.copy() if pixels is picture.pixels else pixels
         colours = [channel for channel in range(pixels.shape[2]) if channel != picture.alpha][:3]
         color = density.color if len(colours) == 3 else [sum(density.color) / 3] * len(colours)

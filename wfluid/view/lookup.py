@@ -11,7 +11,7 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import Vector, field, vector
 from wfluid.fields.ghosts import Ghosts
-from wfluid.fields.graph import LAUNCHES, Replay, exclusive
+from wfluid.fields.graph import LAUNCHES, CapturedGraph, exclusive
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
@@ -92,7 +92,7 @@ class LookUp:
         self.layout = Layout(self.width, self.height)
         self._columns = _tables(*cubic_weights(grid.nx, self.width), -1, device)
         self._rows = _tables(*cubic_weights(grid.ny, self.height), HALO, device)
-        rules = (walls.moved_x_rules(), walls.moved_y_rules())
+        rules = (walls.displacement_x_rules(), walls.displacement_y_rules())
         self._ghosts = [Ghosts(self.strip, axis, device) for axis in rules]
         self.stretched = vector(self.strip, device, 2)
         self._still = field(Layout(grid.nx, grid.ny), device)
@@ -100,7 +100,7 @@ class LookUp:
         self.shown = [
             wp.zeros(self.layout.size, dtype=lookup.Pixel, device=device) for _ in self.source.quads
         ]
-        self._replay: Replay | None = None
+        self._replay: CapturedGraph | None = None
 
     source: PictureOnDevice
     """What is looked up in."""
@@ -153,7 +153,7 @@ class LookUp:
             self.stretch(d_x, d_y)
             if self._replay is None:
                 threads = 1 if self.device.is_cuda else min(free_cores(), STRIPS)
-                self._replay = Replay(self.device, self._look_up, helpers(threads))
+                self._replay = CapturedGraph(self.device, self._look_up, helpers(threads))
         self._replay.launch()
 
     def render(self, d_x: wp.array, d_y: wp.array) -> Picture:

@@ -39,7 +39,7 @@ class LookUpAdjoint:
     def __init__(self, look_up: LookUp):
         self._look_up, self._program = look_up, ADJOINTS[look_up.filter]
         grid, walls, device = look_up.grid, look_up.walls, look_up.device
-        rules = (walls.moved_x_rules(), walls.moved_y_rules())
+        rules = (walls.displacement_x_rules(), walls.displacement_y_rules())
         self._columns = [transposed(grid.nx, look_up.width, along_x, device) for along_x, _ in rules]
         self._rows = [transposed(grid.ny, look_up.height, along_y, device) for _, along_y in rules]
         self.coordinates_bar = vector(look_up.layout, device, 2)
