@@ -1,7 +1,10 @@
 """The house rules: public names are documented and complete, imports run one way."""
 
 import ast
+import graphlib
 import inspect
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +13,21 @@ import pytest
 import wfluid
 
 ROOT = Path(__file__).parents[1]
+
+FLOORS = [
+    {"kernels", "system", "optimize", "domain"},
+    {"fields", "pictures"},
+    {"model", "solve", "files"},
+    {"step", "view", "scene"},
+    {"animation", "gradient"},
+    {"keyframes"},
+    {"morphing"},
+    {"staging"},
+    {"cli"},
+]
+"""The packages from the ground up: each imports from lower floors only."""
+
+FLOOR = {name: number for number, names in enumerate(FLOORS, start=1) for name in names}
 
 
 @pytest.mark.parametrize("name", [name for name in wfluid.__all__ if name != "__version__"])
@@ -47,6 +65,60 @@ def test_device_code_knows_no_host_code():
     for path in (ROOT / "kernels").rglob("*.py"):
         for module in imported_by(path):
             assert module.startswith("wfluid.kernels"), f"{path.name} imports {module}"
+
+
+def packages_imported_by(path):
+    """Packages of wfluid that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "wfluid":
+            deeper = node.module.split(".")[1:]
+            names = deeper[:1] or (alias.name for alias in node.names)
+        elif isinstance(node, ast.Import):
+            names = (alias.name.split(".")[1] for alias in node.names if alias.name.startswith("wfluid."))
+        else:
+            continue
+        yield from (name for name in names if (ROOT / "wfluid" / name).is_dir() or name == "kernels")
+
+
+def test_imports_run_one_way():
+    wrong = [
+        f"{path.relative_to(ROOT)} (floor {FLOOR[own]}) imports {other} (floor {FLOOR[other]})"
+        for path in sorted((ROOT / "wfluid").glob("*/*.py"))
+        for own in [path.parent.name]
+        for other in packages_imported_by(path)
+        if other != own and FLOOR[other] >= FLOOR[own]
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_package_has_a_floor():
+    folders = {path.parent.name for path in ROOT.glob("wfluid/*/__init__.py")}
+    assert {*FLOOR} == folders | {"kernels"}
+
+
+def test_files_of_a_package_import_each_other_without_a_circle():
+    """graphlib refuses a circle and names it."""
+    for package in sorted(path.parent for path in ROOT.glob("wfluid/*/__init__.py")):
+        stems = {path.stem for path in package.glob("*.py")}
+        home = f"wfluid.{package.name}"
+        imports = {
+            path.stem: {
+                module.removeprefix(home + ".").partition(".")[0]
+                for module in imported_by(path)
+                if module.startswith(home + ".")
+            }
+            & stems
+            for path in package.glob("*.py")
+        }
+        list(graphlib.TopologicalSorter(imports).static_order())
+
+
+@pytest.mark.parametrize("name", ["domain", "pictures", "model", "scene", "files", "optimize", "system"])
+def test_descriptions_load_no_warp(name):
+    """What says how a shot looks can be read, checked and written on a machine without Warp."""
+    modules = [f"wfluid.{name}.{path.stem}" for path in (ROOT / "wfluid" / name).glob("*.py")]
+    code = f"import sys, {', '.join(modules)}; sys.exit('warp' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 @pytest.mark.parametrize(
