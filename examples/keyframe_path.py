@@ -69,7 +69,7 @@ def check(match, stops=STOPS):
         "seconds": match.seconds["total"],
     }
     assert figures["keyframes"] == stops * (1 + len(EYES)), figures
-    assert figures["residual_px"] <= 0.25 * SIDE / 512, [arrival.said(SIDE) for arrival in match.arrivals]
+    assert figures["residual_px"] <= 0.25 * SIDE / 512, [arrival.describe(SIDE) for arrival in match.arrivals]
     assert figures["jacobian_min"] > 0.3, figures
     return figures
 

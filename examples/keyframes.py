@@ -66,7 +66,7 @@ def check(match):
         "evaluations": match.evaluations,
         "seconds": match.seconds["total"],
     }
-    assert figures["residual_px"] <= 0.25, [arrival.said(SIDE) for arrival in match.arrivals]
+    assert figures["residual_px"] <= 0.25, [arrival.describe(SIDE) for arrival in match.arrivals]
     assert figures["jacobian_min"] > 0.5, figures
     return figures
 

@@ -18,6 +18,7 @@ _HOME = {
     "animate": "animation.animation",
     "Frame": "animation.frame",
     "Seam": "animation.loops",
+    "Run": "animation.run",
     "Arbitrary": "domain.envelopes",
     "Constant": "domain.envelopes",
     "Envelope": "domain.envelopes",

@@ -1,6 +1,7 @@
 """Frames and steps: when, how many, what they carry."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -167,7 +168,26 @@ def test_impossible_settings_are_refused(device, settings):
         list(animate(checkerboard(), Fluid(), [], 0.2, 10, **settings))
 
 
-def test_seconds_add_up(device):
+def test_a_run_measures_its_own_frames_only(device):
+    """Neither another run of the animation nor one of a copy of it adds to the times of a run."""
     animation = Animation(checkerboard(), Fluid(), (PUSH,), Timeline(0.2, 10), cells=32, device=device.alias)
+    run = animation.frames()
+    assert len(list(run)) == run.frame_count == 3
+    times = replace(run.seconds)
+    assert times.simulate > 0 and times.lookup > 0
     list(animation.frames())
-    assert animation.seconds.simulate > 0 and animation.seconds.lookup > 0
+    list(replace(animation, width=4).frames())
+    assert run.seconds == times
+    assert run.seam is None
+
+
+def test_a_copy_of_an_animation_shares_no_results():
+    """`dataclasses.replace` hands every field on, so none may hold what a run writes to."""
+    animation = Animation(checkerboard(), Fluid(), (PUSH,), Timeline(0.2, 10), loop="pingpong")
+    values = {one.name: getattr(animation, one.name) for one in fields(animation) if one.init}
+    written = [
+        name
+        for name, value in values.items()
+        if is_dataclass(value) and not type(value).__dataclass_params__.frozen
+    ]
+    assert written == []

@@ -67,7 +67,8 @@ def test_blows_make_velocities_swing_about_zero():
 def test_an_oscillating_loop_comes_back_to_its_untouched_picture(device):
     """The first frame is the picture itself; the seam's step is one like those around it."""
     made = animation("oscillate", [GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)], device)
-    frames = list(made.frames())
+    run = made.frames()
+    frames = list(run)
     assert len(frames) == 15 == made.frame_count
     np.testing.assert_array_equal(frames[0].picture.pixels, made.picture.pixels)
     shown = maps(frames)
@@ -75,7 +76,7 @@ def test_an_oscillating_loop_comes_back_to_its_untouched_picture(device):
     across = np.abs(shown[0] - shown[-1]).max()
     assert np.abs(shown).max() > 0.004
     assert across < 1.3 * steps.max(), (across, steps.max())
-    seam = made.seam
+    seam = run.seam
     assert seam.position_max < 1e-6  # of the frame that would follow the last
     assert seam.velocity_max / 15 < 0.5 * steps.max(), (seam, steps.max())
     assert 0 < seam.drift_mean < seam.drift_max
@@ -85,37 +86,39 @@ def test_without_the_drift_taken_off_the_loop_would_not_close(device, monkeypatc
     """What is taken off is the way that the fluid streams over the lap, and no more."""
     force = GaussianForce((0.5, 0.4), (4.0, 1.0), 0.1, SWING)
     made = animation("oscillate", [force], device)
-    bent = maps(made.frames())
+    bending = made.frames()
+    bent = maps(bending)
     import wfluid.animation.loops
 
     monkeypatch.setattr(wfluid.animation.loops, "_bend", lambda n, frames: 0.0)
-    straight = animation("oscillate", [force], device)
-    even = maps(straight.frames())
-    assert straight.seam.drift_max == pytest.approx(made.seam.drift_max, rel=1e-6)
-    assert made.seam.velocity_max < 0.7 * straight.seam.velocity_max
+    straight = animation("oscillate", [force], device).frames()
+    even = maps(straight)
+    assert straight.seam.drift_max == pytest.approx(bending.seam.drift_max, rel=1e-6)
+    assert bending.seam.velocity_max < 0.7 * straight.seam.velocity_max
     assert np.abs(bent[7] - even[7]).max() < 1e-6  # bent near the seam only
 
 
 def test_a_pingpong_goes_back_the_way_it_came(device):
     made = animation("pingpong", [VortexForce((0.5, 0.4), 6.0, 0.1)], device, duration=0.9)
-    frames = list(made.frames())
+    run = made.frames()
+    frames = list(run)
     shown = maps(frames)
     assert len(frames) == 14 == made.frame_count  # an even number of 0.9 s at 15 a second
     for n in range(1, 7):
         np.testing.assert_array_equal(shown[n], shown[14 - n])
-    assert made.seam.position_max == 0
+    assert run.seam.position_max == 0
     turn = np.hypot(*np.moveaxis(2 * (shown[7] - shown[6]), -1, 0)).max() * 15
-    assert made.seam.velocity_max == pytest.approx(turn, rel=1e-4)
+    assert run.seam.velocity_max == pytest.approx(turn, rel=1e-4)
 
 
 def test_a_crossfade_flows_from_its_end_into_its_beginning(device):
     """All steps are small, that across the seam too; the middle is the run itself."""
     force = NoiseForce(strength=2.0, scale=0.4, seed=1)
-    made = animation("crossfade", [force], device)
-    shown = maps(made.frames())
+    run = animation("crossfade", [force], device).frames()
+    shown = maps(run)
     steps = np.abs(np.diff(np.concatenate([shown, shown[:1]]), axis=0)).max(axis=(1, 2, 3))
     assert len(shown) == 15 and steps.max() < 0.5 * np.abs(shown).max()
-    assert made.seam.position_max < 1e-6
+    assert run.seam.position_max < 1e-6
     plain = maps(animation(None, [force], device).frames())
     np.testing.assert_allclose(shown[:11], plain[4:15], atol=1e-6)
 

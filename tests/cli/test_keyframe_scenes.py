@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from scenes import KEYS, write_pictures
 
+import wfluid.animation.animation
+import wfluid.cli.render
 from wfluid.cli.main import main
 from wfluid.cli.progress import SearchProgress
 from wfluid.domain.timeline import substeps_for
@@ -150,6 +152,28 @@ def test_points_arrive_and_the_report_says_how_near(shot):
     assert np.hypot(float(last[3]) - 24, float(last[4]) - 17) <= report["tolerance_px"]
     assert len(list(folder.glob("f.*.png"))) == 7
     assert read_picture(folder / "a.png").width > 1000
+
+
+def test_a_plot_adds_nothing_to_the_times_in_the_report(folder, monkeypatch):
+    """The frames run for the figure, slowed down here, are not those of the animation that is written."""
+    slow, measure, plot = [], wfluid.animation.animation.measure_map, wfluid.cli.render.plot_match
+
+    def slowly(*arguments):
+        time.sleep(0.3 if slow else 0.0)
+        return measure(*arguments)
+
+    def plotted(*arguments):
+        slow.append(True)
+        plot(*arguments)
+        slow.clear()
+
+    monkeypatch.setattr("wfluid.animation.animation.measure_map", slowly)
+    monkeypatch.setattr("wfluid.cli.render.plot_match", plotted)
+    files = ("-o", "f.####.png", "--report", "r.json", "--plot", "a.png")
+    main(["keyframes", "small.png", "--move", "20,20:22,19", "--tolerance", "1", *QUICK, *files])
+    seconds = json.loads((folder / "r.json").read_text())["seconds"]
+    assert seconds["simulate"] < 0.3, seconds
+    assert {"compile", "simulate", "lookup", "write", "total"} == set(seconds)
 
 
 def test_a_saved_scene_has_the_forces_and_needs_no_search(shot, tmp_path):

@@ -234,10 +234,9 @@ def test_a_sharp_mask_is_softened_for_the_warp_and_that_is_said(morph_of):
     """A jump in time where the flow goes 2.9 cells across it folds; the blend keeps the sharp mask."""
     upper = np.repeat((np.arange(80) < 40)[:, None], 120, axis=1).astype(float)
     found = going(morph_of("dots"), mask=Painted(upper), delay=0.5)
-    assert found.said == []
     frames = list(found.frames())
-    assert len(found.said) == 1
-    assert found.said[0].startswith("the timing mask is softened by ") and "px for the warp" in found.said[0]
+    (note,) = found.notes
+    assert note.startswith("the timing mask is softened by ") and "px for the warp" in note
     least = min(min(f.quality.jacobian_min, f.to_quality.jacobian_min) for f in frames)
     assert least >= LEAST_JACOBIAN, least
     above, below = (np.abs(one.displacement) for one in (frames[3].to_map, frames[3].map))
@@ -255,7 +254,7 @@ def test_a_soft_mask_or_no_delay_is_left_as_it_is(morph_of):
     for settings in ({"mask": soft, "delay": 0.3}, {"mask": Painted(SPLIT), "delay": 0.0}):
         found = going(morph_of("dots"), **settings)
         list(found.frames())
-        assert found.said == []
+        assert found.notes == ()
 
 
 def test_without_a_delay_a_mask_changes_nothing(morph_of):
@@ -347,7 +346,7 @@ def test_grey_becomes_coloured(device_name):
     first, *_, last = found.frames()
     np.testing.assert_array_equal(first.picture.pixels, np.repeat(grey.pixels, 3, axis=2))
     np.testing.assert_array_equal(last.picture.pixels, colours.pixels)
-    assert found.pair.said == ("the first picture is grey, the other has colours: it is shown as colours",)
+    assert found.pair.notes == ("the first picture is grey, the other has colours: it is shown as colours",)
 
 
 @pytest.mark.parametrize("light", ["linear", "display"])

@@ -100,13 +100,13 @@ def searched(name, device):
 
 def going(found, **changes):
     """A morph on the same flow that goes another way."""
-    return replace(found, settings=replace(found.settings, **changes), said=[])
+    return replace(found, settings=replace(found.settings, **changes))
 
 
 def of_pictures(found, a, b):
     """A morph of other pictures of the same sizes on the same flow."""
     match = replace(found.match, animation=replace(found.match.animation, picture=a))
-    return replace(found, match=match, pair=replace(found.pair, a=a, b=b), said=[])
+    return replace(found, match=match, pair=replace(found.pair, a=a, b=b))
 
 
 def psnr(got, wanted):

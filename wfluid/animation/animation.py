@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from wfluid.animation.frame import Frame, FrameTimes
+from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
+from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.domain.grid import LEAST_CELLS, Grid
 from wfluid.domain.timeline import Timeline
@@ -35,16 +36,19 @@ class Animation:
     """A picture, a fluid, forces and a timeline; iterate over `frames()` to run it.
 
     Nothing is computed before the first frame is asked for, and no frame is kept.
+
+    Raises:
+        ValueError: a value outside its range, or a loop that does not suit the forces.
     """
 
     picture: Picture
-    """What is animated."""
+    """The picture that is animated."""
     fluid: Fluid
-    """What it is made of."""
+    """Viscosity, walls, densities and numerical scheme."""
     forces: Sequence[Force | Group]
-    """What moves it."""
+    """Forces and groups of forces on the fluid."""
     timeline: Timeline
-    """When frames are shown, and how many steps lie between."""
+    """Duration, frame rate and steps per frame."""
     cells: int = 256
     """Cells of the grid along the picture's longer side."""
     width: int | None = None
@@ -52,21 +56,17 @@ class Animation:
     height: int | None = None
     """Height of the frames [px]; the picture's by default."""
     filter: str = "cubic"
-    """How the picture is read between pixels: "nearest", "bilinear", "cubic"."""
+    """Interpolation between the picture's pixels: "nearest", "bilinear", "cubic", "lanczos"."""
     edge: str = "clamp"
     """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
     device: str | None = None
     """"cpu" (default), "cuda", "cuda:1", …"""
     layers: Mapping[str, Picture] = field(default_factory=dict)
-    """Further pictures and mattes that go through the same map, stretched over the picture, by name."""
+    """Further pictures and mattes warped by the same map, stretched over the picture, by name."""
     points: Sequence[tuple[float, float]] = ()
-    """Places x, y of the picture [longer side] that are followed."""
+    """Positions x, y of points of the picture that are tracked [longer side]."""
     loop: str | None = None
-    """"oscillate", "pingpong" or "crossfade": the frames follow one another without end."""
-    seam: Seam = field(default_factory=Seam, compare=False)
-    """How well the loop's end meets its beginning, filled in when all frames are made."""
-    seconds: FrameTimes = field(default_factory=FrameTimes, compare=False)
-    """Where the time went, filled in while frames are made."""
+    """Kind of loop: "oscillate", "pingpong" or "crossfade"; None for an animation with an end."""
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
@@ -99,19 +99,17 @@ class Animation:
     @cached_property
     def solver(self) -> Solver:
         """The solver; asking for it opens the device and loads the kernels."""
-        solver = Solver(self.grid, self.fluid, open_device(self.device))
-        self.seconds.compile = solver.compile_seconds
-        return solver
+        return Solver(self.grid, self.fluid, open_device(self.device))
 
-    def _moments(self) -> Iterator[SimulatedFrame]:
-        """The fluid at every frame."""
-        runner = Simulation(self.solver, self.timeline, self.points)
-        if self.loop is None:
-            return runner.moments(self._acting, self.timeline.frames - 1)
-        return loop_frames(self.loop, runner, self._acting, self._loop_frames, self.timeline.fps, self.seam)
+    def _moments(self, seam: Seam | None) -> Iterator[SimulatedFrame]:
+        """The fluid at every frame; the measurements of a loop go to `seam`."""
+        simulation = Simulation(self.solver, self.timeline, self.points)
+        if seam is None:
+            return simulation.moments(self._acting, self.timeline.frames - 1)
+        return loop_frames(self.loop, simulation, self._acting, self._loop_frames, self.timeline.fps, seam)
 
     def look_up(self, picture: Picture) -> LookUp:
-        """Shows a picture; it is shrunk first when the frames are smaller, so that they do not alias."""
+        """A look-up in a picture, which is shrunk first where frames are smaller, against aliasing."""
         width, height = self.width or self.picture.width, self.height or self.picture.height
         return LookUp(
             picture.shrunk(width, height),
@@ -124,17 +122,22 @@ class Animation:
             edge=self.edge,
         )
 
-    def frames(self) -> Iterator[Frame]:
-        """Run the animation from rest, one frame at a time."""
+    def frames(self) -> Run[Frame]:
+        """A run of the animation from rest: an iterator of its frames, with its times and its seam."""
+        seconds, seam = RunTimes(), None if self.loop is None else Seam()
+        return Run(self._frames(seconds, seam), self.frame_count, seconds, seam)
+
+    def _frames(self, seconds: RunTimes, seam: Seam | None) -> Iterator[Frame]:
         clock, walls = time.perf_counter, self.fluid.walls
         shown = self.look_up(self.picture)
         layers = {name: self.look_up(layer) for name, layer in self.layers.items()}
-        moments = self._moments()
+        moments = self._moments(seam)
         for index in range(self.frame_count):
             began = clock()
             moment = next(moments)
             state = moment.state
-            quality, warp = measure_map(state, walls), CoordinateMap.of_state(state, walls)
+            warp = CoordinateMap.of_state(state, walls)
+            quality = measure_map(state, warp)
             simulated = clock()
             still = quality.displacement_max == 0
             picture, *others = (
@@ -143,8 +146,8 @@ class Animation:
             )
             densities = state.densities
             picture = composite_densities(picture, self.fluid.densities, densities, walls.periodic)
-            self.seconds.simulate += simulated - began
-            self.seconds.lookup += clock() - simulated
+            seconds.simulate += simulated - began
+            seconds.lookup += clock() - simulated
             yield Frame(
                 index,
                 index / self.timeline.fps,
@@ -156,7 +159,7 @@ class Animation:
                 dict(zip(self.fluid.density_names, densities, strict=True)),
                 state.points,
             )
-        next(moments, None)  # what a loop measures when it is through
+        next(moments, None)  # a loop measures its seam after its last frame
 
 
 def animate(
@@ -167,7 +170,7 @@ def animate(
     fps: float = 24.0,
     substeps: int | None = None,
     **settings,
-) -> Iterator[Frame]:
+) -> Run[Frame]:
     """Frames of `picture` moved by `forces` for `duration` seconds, made as they are asked for.
 
     `settings` are those of `Animation`: cells, width, height, filter, edge, device, layers, points, loop.

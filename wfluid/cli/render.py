@@ -11,6 +11,7 @@ from pathlib import Path
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.estimate import check_memory, estimate
+from wfluid.animation.loops import Seam
 from wfluid.cli.progress import SearchProgress
 from wfluid.cli.report import Report, write_report
 from wfluid.cli.writing import kept_frames, open_writers, write_frames
@@ -100,7 +101,7 @@ def run_scene(scene: Scene, how: RunOptions) -> int:
         write_picture(how.preview, draw_controls(scene, animation, aims))
     if how.preview or not (scene.outputs or searches):
         return 0
-    _load(animation, how.quiet)
+    compiling = _load(animation, how.quiet)
     match = _matched(animation, aims, how, FACTORS_OF_MORPH if settings else None) if searches else None
     morph = Morph(match, staged.pair, settings) if match and settings else None
     if match:
@@ -112,14 +113,22 @@ def run_scene(scene: Scene, how: RunOptions) -> int:
     least = math.inf
     if scene.outputs:
         report = Report(animation, match, aims.side if aims else 1.0, morph)
-        writing = write_frames(morph or animation, writers, report, how.quiet)
-        for text in morph.said if morph else ():
+        run = (morph or animation).frames()
+        writing = write_frames(run, writers, report, how.quiet)
+        for text in morph.notes if morph else ():
             note(text)
-        _judge_loop(animation, report, note)
-        times = {"write": writing, "total": time.perf_counter() - began}
+        if run.seam:
+            _judge_loop(animation, run.seam, report, note)
+        times = {
+            "compile": compiling,
+            "simulate": run.seconds.simulate,
+            "lookup": run.seconds.lookup,
+            "write": writing,
+            "total": time.perf_counter() - began,
+        }
         for output in scene.outputs:
             if output.of == "report":
-                write_report(output.file, report.as_dict(times))
+                write_report(output.file, report.as_dict(times, run.seam))
         least = min(least, report.of_b[0])
     if not match:
         return 0
@@ -199,7 +208,7 @@ def _judge_match(match: Match, side: float, settings: MorphSettings | None) -> i
     print(f"wfluid: {match.status}: {text}", file=sys.stderr)
     for arrival in match.arrivals:
         if arrival.residual > match.tolerance:
-            print(f"wfluid: {arrival.said(side, timed=settings is None)}", file=sys.stderr)
+            print(f"wfluid: {arrival.describe(side, timed=settings is None)}", file=sys.stderr)
     return EXIT_INTERRUPTED if match.status == STOPPED else EXIT_FAILED
 
 
@@ -229,8 +238,8 @@ def _say_plan(animation: Animation, outputs: Sequence[Output], settings: MorphSe
     print(f"writes    {', '.join(str(output.file) for output in outputs) or 'nothing'}")
 
 
-def _load(animation: Animation, quiet: bool) -> None:
-    """Load the kernels, saying so where that takes a compiler."""
+def _load(animation: Animation, quiet: bool) -> float:
+    """Load the kernels, with a message where that takes a compiler; returns the seconds it took."""
     device = open_device(animation.device)
     new = not kernels_are_built(device)
     if new and not quiet:
@@ -238,11 +247,12 @@ def _load(animation: Animation, quiet: bool) -> None:
     seconds = animation.solver.compile_seconds
     if new and not quiet:
         print(f"compiled in {seconds:.1f} s", file=sys.stderr)
+    return seconds
 
 
-def _judge_loop(animation: Animation, report: Report, note: Callable[[str], None]) -> None:
-    """Say where a loop had to be bent far to close."""
-    drift, longest = animation.seam.drift_max, report.extremes["displacement_max_px"]
+def _judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[[str], None]) -> None:
+    """Note a loop that had to be bent far to close."""
+    drift, longest = seam.drift_max, report.extremes["displacement_max_px"]
     side = max(animation.picture.width, animation.picture.height)
     if animation.loop == "oscillate" and drift * side > STREAMED * longest:
         note(

@@ -12,6 +12,7 @@ from typing import Any
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
+from wfluid.animation.loops import Seam
 from wfluid.keyframes.match import Match
 from wfluid.model.force import Force, flatten
 from wfluid.model.painted import Keyed, Painted, Quantity
@@ -95,10 +96,10 @@ class Report:
         timeline = self.animation.timeline
         return timeline.steps if self.morph else max(self.frames - 1, 0) * timeline.steps_per_frame
 
-    def _loop(self) -> dict[str, Any]:
-        """What the loop's seam measures, where there is one."""
-        animation, seam = self.animation, self.animation.seam
-        if animation.loop is None:
+    def _loop(self, seam: Seam | None) -> dict[str, Any]:
+        """The measurements of a loop's seam."""
+        animation = self.animation
+        if seam is None:
             return {}
         side = max(animation.picture.width, animation.picture.height)
         a_frame = side / animation.timeline.fps
@@ -176,14 +177,13 @@ class Report:
                 },
                 "inconsistency_px": {"mean": mean, "max": most},
                 "blend": settings.blend,
-                "notes": [*morph.pair.said, *morph.said],
+                "notes": [*morph.pair.notes, *morph.notes],
             }
         }
 
-    def as_dict(self, seconds: Mapping[str, float]) -> dict[str, Any]:
-        """The report; `seconds` adds the times that the animation does not know."""
+    def as_dict(self, seconds: Mapping[str, float], seam: Seam | None = None) -> dict[str, Any]:
+        """The report, with the times of the whole command [s], and the seam of a loop."""
         animation, fluid = self.animation, self.animation.fluid
-        times = animation.seconds
         return {
             "picture": [animation.picture.width, animation.picture.height],
             "grid": [animation.grid.nx, animation.grid.ny],
@@ -205,15 +205,10 @@ class Report:
                 "densities": list(fluid.density_names),
                 "layers": list(animation.layers),
             },
-            "seconds": {
-                "compile": times.compile,
-                "simulate": times.simulate,
-                "lookup": times.lookup,
-                **seconds,
-            },
+            "seconds": dict(seconds),
             **self.extremes,
             "area": _area(self.extremes),
-            **self._loop(),
+            **self._loop(seam),
             **self._keyframes(),
             **self._morph(),
             "solves": self.solves,

@@ -13,11 +13,11 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
+from wfluid.animation.run import Run
 from wfluid.cli.progress import FrameProgress
 from wfluid.cli.report import Report
 from wfluid.files.output import open_output
 from wfluid.files.tracks import TrackWriter
-from wfluid.morphing.morph import Morph
 from wfluid.pictures.picture import Picture
 from wfluid.scene.scene import Output, Scene
 from wfluid.system.interrupt import HeldInterrupt
@@ -67,7 +67,7 @@ def _shown(frame: Frame, of: str) -> Picture:
 
 
 def write_frames(
-    animation: Animation | Morph,
+    run: Run,
     writers: Sequence[tuple[_Writer, Callable[[Frame], None]]],
     report: Report,
     quiet: bool,
@@ -87,9 +87,9 @@ def write_frames(
         with (
             HeldInterrupt() as interrupt,
             ThreadPoolExecutor(1) as pool,
-            FrameProgress(animation.frame_count, quiet) as advance,
+            FrameProgress(run.frame_count, quiet) as advance,
         ):
-            for frame in animation.frames():
+            for frame in run:
                 interrupt.check()
                 report.add(frame)
                 if len(waiting) >= QUEUED_FRAMES:

@@ -39,8 +39,8 @@ class Arrival:
         missed = math.dist(self.particle, self.keyframe.destination)
         return max(missed, math.dist(self.source, self.keyframe.point))
 
-    def said(self, side: float, timed: bool = True) -> str:
-        """It in a line, in pixels of a picture whose longer side is `side`; with its time, if wanted."""
+    def describe(self, side: float, *, timed: bool = True) -> str:
+        """One line with the way, the residual and the reason, in pixels of a picture `side` pixels long."""
         (x, y), (to_x, to_y) = self.keyframe.point, self.keyframe.destination
         way = f"{x * side:g},{y * side:g}"
         way = f"the pin {way}" if self.pinned else f"{way} to {to_x * side:g},{to_y * side:g}"

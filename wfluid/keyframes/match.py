@@ -358,10 +358,14 @@ def _tracks(
         solver.step(now, then, forces, t, timeline.dt, until=until)
         now, then = then, now
         tracks.append(now.points)
+        ends_a_frame = bool(maps) and (step + 1) % timeline.steps_per_frame == 0
+        if step + 1 not in maps and not ends_a_frame:
+            continue
+        warp = CoordinateMap.of_state(now, solver.fluid.walls)
         if step + 1 in maps:
-            found[step + 1] = CoordinateMap.of_state(now, solver.fluid.walls)
-        if maps and (step + 1) % timeline.steps_per_frame == 0:
-            quality = measure_map(now, solver.fluid.walls)
+            found[step + 1] = warp
+        if ends_a_frame:
+            quality = measure_map(now, warp)
             least, greatest = min(least, quality.jacobian_min), max(greatest, quality.jacobian_max)
     return np.stack(tracks), found, (least, greatest)
 

@@ -14,16 +14,18 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from wfluid.animation.animation import Animation
+from wfluid.animation.run import Run, RunTimes
 from wfluid.domain.curves import DELAY, EASE, local
 from wfluid.domain.operators import blurred
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
+from wfluid.fields.state import State
 from wfluid.keyframes.keyframes import ParticleKeyframe
 from wfluid.keyframes.match import Match, match_keyframes
 from wfluid.keyframes.search import Progress
@@ -35,7 +37,8 @@ from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.blend import blended
 from wfluid.pictures.pairing import PicturePair, paired
 from wfluid.pictures.picture import Picture
-from wfluid.view.quality import measure_map
+from wfluid.view.coordinate_map import CoordinateMap
+from wfluid.view.quality import MapQuality, measure_map
 
 FLOW = Timeline(1.0, fps=24.0, substeps=2)
 """The flow's own time: a morph's frames are at parts of it, however long the morph is shown."""
@@ -59,13 +62,11 @@ class Morph:
     """Two pictures on one flow; iterate over `frames()`."""
 
     match: Match
-    """The flow's forces, and how near points of the first picture come to those of the second."""
+    """The forces of the flow, and the residuals of its keyframes."""
     pair: PicturePair
-    """The pictures; the first is the match's."""
+    """The two pictures; the first is also that of the match's animation."""
     settings: MorphSettings
-    """How it goes."""
-    said: list[str] = field(default_factory=list)
-    """What was done to the mask that a user should know, once the first frame is there."""
+    """Timing, curves and blending."""
 
     @property
     def animation(self) -> Animation:
@@ -79,39 +80,45 @@ class Morph:
 
     @cached_property
     def passage(self) -> FlowMaps:
-        """The flow's maps."""
-        began, animation = time.perf_counter(), self.animation
-        found = flow_maps(animation.solver, animation.forces, animation.timeline)
-        animation.seconds.simulate += time.perf_counter() - began
-        return found
+        """The maps of the flow, computed when they are first asked for."""
+        animation = self.animation
+        return flow_maps(animation.solver, animation.forces, animation.timeline)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Changes to the timing mask that a user should know; asking runs the flow if there is a mask."""
+        sigma, side = self._timing[1], max(self.animation.picture.width, self.animation.picture.height)
+        if not sigma:
+            return ()
+        return (f"the timing mask is softened by {sigma * side:.3g} px for the warp, which would fold",)
 
     @cached_property
-    def _ahead(self) -> np.ndarray | None:
-        """Where the warp happens first, on the grid: the mask, softened until no map of a frame folds."""
+    def _timing(self) -> tuple[np.ndarray | None, float]:
+        """The mask on the grid, blurred until no frame's map folds, and the blur's sigma [longer side]."""
         mask, grid = self.settings.mask, self.animation.grid
         if mask is None:
-            return None
+            return None, 0.0
         painted, state = mask.sample(grid), self.animation.solver.rest()
         without = min(self._least_jacobian(None, state), LEAST_JACOBIAN)
         sigma, ahead = 0.0, painted
         while self._least_jacobian(ahead, state) < without and sigma < 1:
             sigma = 2 * sigma or min(grid.hx, grid.hy)
             ahead = blurred(painted, grid, sigma, self.passage.walls.periodic)
-        if sigma:
-            side = max(self.animation.picture.width, self.animation.picture.height)
-            text = f"the timing mask is softened by {sigma * side:.3g} px for the warp, which would fold"
-            self.said.append(text)
-        return ahead
+        return ahead, sigma
 
-    def _least_jacobian(self, ahead: np.ndarray | None, state) -> float:
+    def _least_jacobian(self, ahead: np.ndarray | None, state: State) -> float:
         """The least det J of both maps over all frames."""
         least = math.inf
         for index in range(self.settings.timeline.frames):
             part = self._warped(index, ahead)
             for warp in (self.passage.since_start(part), self.passage.until_end(part)):
-                self.animation.solver.set_map(state, warp.displacement)
-                least = min(least, measure_map(state, warp.walls).jacobian_min)
+                least = min(least, self._measured(warp, state).jacobian_min)
         return least
+
+    def _measured(self, warp: CoordinateMap, state: State) -> MapQuality:
+        """The measures of a map, which `state` takes over."""
+        self.animation.solver.set_map(state, warp.displacement)
+        return measure_map(state, CoordinateMap.of_state(state, warp.walls))
 
     def _part(self, index: int) -> float:
         return index / (self.settings.timeline.frames - 1)
@@ -138,12 +145,17 @@ class Morph:
         step = min(int(at), len(tracks) - 2)
         return tracks[step] + (at - step) * (tracks[step + 1] - tracks[step])
 
-    def frames(self) -> Iterator[MorphFrame]:
-        """The frames, in their order; the first picture's is the picture itself, and the second's."""
-        animation, settings = self.animation, self.settings
-        clock, solver, walls = time.perf_counter, animation.solver, animation.fluid.walls
+    def frames(self) -> Run[MorphFrame]:
+        """The frames in the order of the settings; the first and the last are the pictures themselves."""
+        seconds = RunTimes()
+        return Run(self._frames(seconds), self.frame_count, seconds)
+
+    def _frames(self, seconds: RunTimes) -> Iterator[MorphFrame]:
+        animation, settings, clock = self.animation, self.settings, time.perf_counter
         shown = [animation.look_up(picture) for picture in (self.pair.a, self.pair.b)]
-        state, ahead, passage = solver.rest(), self._ahead, self.passage
+        began = clock()
+        state, passage, ahead = animation.solver.rest(), self.passage, self._timing[0]
+        seconds.simulate += clock() - began
         mask = settings.mask and settings.mask.resampled(shown[0].width, shown[0].height)
         for number, index in enumerate(settings.order):
             began = clock()
@@ -151,8 +163,7 @@ class Morph:
             maps, qualities, pictures = (passage.since_start(part), passage.until_end(part)), [], []
             lookup = 0.0
             for warp, look_up in zip(maps, shown, strict=True):
-                solver.set_map(state, warp.displacement)
-                qualities.append(measure_map(state, walls))
+                qualities.append(self._measured(warp, state))
                 looked = clock()
                 still = qualities[-1].displacement_max == 0
                 pictures.append(look_up.untouched if still else look_up.render(state.d_x, state.d_y))
@@ -160,8 +171,8 @@ class Morph:
             own = self._part(index)
             weight = settings.blend_curve.at(own if mask is None else local(own, mask, settings.delay))
             picture = blended(*pictures, weight, settings.blend)
-            animation.seconds.lookup += lookup
-            animation.seconds.simulate += clock() - began - lookup
+            seconds.lookup += lookup
+            seconds.simulate += clock() - began - lookup
             yield MorphFrame(
                 number,
                 number / settings.timeline.fps,

@@ -25,7 +25,7 @@ class PicturePair:
     """What that is."""
     size: tuple[int, int]
     """Width and height of all of the second picture [px]."""
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
     """What was done to them that a user should know."""
 
     def place(self, point: Place, extent: tuple[float, float]) -> Place:
@@ -100,8 +100,8 @@ def paired(a: Picture, b: Picture, fit: str) -> PicturePair:
         ValueError: no such fit; pictures that cannot be blended.
     """
     through = window((b.width, b.height), (a.width, a.height), fit)
-    first, second, said = alike(a, b)
-    return PicturePair(first, seen(second, through), through, (b.width, b.height), tuple(said))
+    first, second, notes = alike(a, b)
+    return PicturePair(first, seen(second, through), through, (b.width, b.height), tuple(notes))
 
 
 def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:
@@ -114,26 +114,26 @@ def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:
         raise ValueError("one picture has colours, the other numbers (data): they cannot be blended")
     if (a.pixels.shape[2], a.alpha) == (b.pixels.shape[2], b.alpha):
         return a, b, []
-    said, pixels, names = [], [_colours(a), _colours(b)], ("the first", "the second")
+    notes, pixels, names = [], [_colours(a), _colours(b)], ("the first", "the second")
     counts = [values.shape[2] for values in pixels]
     if counts[0] != counts[1]:
         if sorted(counts) != [1, 3]:
             raise ValueError(f"{counts[0]} channels and {counts[1]}: pictures of one kind can be blended")
         grey = counts.index(1)
         pixels[grey] = np.repeat(pixels[grey], 3, axis=2)
-        said.append(f"{names[grey]} picture is grey, the other has colours: it is shown as colours")
+        notes.append(f"{names[grey]} picture is grey, the other has colours: it is shown as colours")
     alpha = None
     if a.alpha is not None or b.alpha is not None:
         alpha = pixels[0].shape[2]
         for n, picture in enumerate((a, b)):
             if picture.alpha is None:
                 opacity = np.ones_like(pixels[n][..., :1])
-                said.append(f"{names[n]} picture has no alpha, the other has: it is taken as opaque")
+                notes.append(f"{names[n]} picture has no alpha, the other has: it is taken as opaque")
             else:
                 opacity = picture.pixels[..., [picture.alpha]]
             pixels[n] = np.concatenate([pixels[n], opacity], axis=2)
     a, b = (replace(one, pixels=its, alpha=alpha) for one, its in zip((a, b), pixels, strict=True))
-    return a, b, said
+    return a, b, notes
 
 
 def _colours(picture: Picture) -> np.ndarray:

@@ -131,7 +131,7 @@ class _Stage:
         name = self.scene.folder / self.morph["to"]
         other = read_picture(name, self.tables["picture"].get("colorspace", "auto"))
         pair = paired(self.picture, other, self.morph.get("fit", "fill"))
-        for text in pair.said:
+        for text in pair.notes:
             self.note(text)
         _drawn_size(self.tables, "morph", other)
         return pair

@@ -1,4 +1,4 @@
-"""What a map is judged by: area change, displacement, look-ups outside the picture."""
+"""Measures of a map: change of area, displacement, sources outside the picture."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from wfluid.domain.walls import Walls
 from wfluid.fields.graph import exclusive
 from wfluid.fields.state import State
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.view import quality
+from wfluid.view.coordinate_map import CoordinateMap
 
 
 @dataclass(frozen=True)
 class MapQuality:
-    """What a map does to the picture: folds, areas, distances."""
+    """How a map changes the picture: folds, areas, distances."""
 
     jacobian_min: float
     """Least det of the map's Jacobian over the cells; 0 or less is a fold."""
@@ -27,18 +27,18 @@ class MapQuality:
     displacement_mean: float
     """Mean length of the displacement [longer side]."""
     outside_fraction: float
-    """Part of the cells whose source lies beyond a closed edge."""
+    """Fraction of the cells whose source lies beyond a closed edge."""
 
 
 @exclusive
-def measure_map(state: State, walls: Walls) -> MapQuality:
-    """Judge a state's map, on its device."""
+def measure_map(state: State, warp: CoordinateMap) -> MapQuality:
+    """The measures of a state's map; `warp` is the host's copy of that map (`CoordinateMap.of_state`)."""
     layout, device, grid = state.layout, state.u.device, state.grid
     least, greatest, outside = (wp.empty(layout.ny, dtype=Real, device=device) for _ in range(3))
-    closed = [int(not periodic) for periodic in walls.periodic]
+    closed = [int(not periodic) for periodic in warp.walls.periodic]
     inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
     quality.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
-    length = np.hypot(*state.displacement)
+    length = np.hypot(*np.moveaxis(warp.displacement, 2, 0))
     return MapQuality(
         float(least.numpy().min()),
         float(greatest.numpy().max()),
