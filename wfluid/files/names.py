@@ -1,4 +1,4 @@
-"""Names of written files: frame numbers, folders."""
+"""Names of output files: frame numbers, folders."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ import re
 from pathlib import Path
 
 from wfluid.pictures.formats import PictureError
-from wfluid.system.atomic import remove_leftovers
 
 FIRST_FRAME = 1001
 """Number of the first frame of a sequence (the convention of film work)."""
 
 
 def check_folder(path: Path) -> None:
-    """Refuse a file whose folder is not there or cannot be written; clear what killed runs left in it.
+    """Refuse a path at which no file can be written; nothing on the disk changes.
 
     Raises:
-        PictureError: with the reason.
+        PictureError: a folder that does not exist or cannot be written, or a path that is a folder.
     """
     if not path.parent.is_dir():
         raise PictureError(f"{path.parent}: no such folder; make it first")
@@ -25,7 +24,6 @@ def check_folder(path: Path) -> None:
         raise PictureError(f"{path.parent}: this folder cannot be written to")
     if path.is_dir():
         raise PictureError(f"{path}: a folder; name a file in it")
-    remove_leftovers(path.parent)
 
 
 def files_written(path: Path, start: int, frames: int) -> set[Path]:

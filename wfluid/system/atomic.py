@@ -1,19 +1,31 @@
-"""Files that appear whole or not at all, native libraries that keep quiet, memory that is there."""
+"""Files that appear complete or not at all."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-_PART = ".part"
+NAME_LIMIT = 255
+"""Longest name of a file on common file systems [bytes]."""
+
+HOST_LIMIT = 64
+"""Bytes of the host's name that a temporary name holds."""
 
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """A temporary name in the same folder, renamed to `path` on success and removed on failure."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{_PART}{path.suffix}")
+    """A temporary file in the same folder, renamed to `path` on success and removed on failure.
+
+    Temporary files of `path` that killed processes of this host have left are removed first.
+    """
+    remove_leftovers(path)
+    process = os.getpid()
+    temporary = path.with_name(f"{_prefix(path)}{process}-{_started(process)}.part{path.suffix}")
     try:
         yield temporary
         os.replace(temporary, path)
@@ -21,19 +33,52 @@ def atomic_file(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that were killed before they could."""
-    for path in folder.glob(f".*{_PART}.*"):
-        owner = path.name.removesuffix(path.suffix).removesuffix(_PART).rpartition(".")[2]
-        if owner.isdigit() and not _alive(int(owner)):
-            path.unlink(missing_ok=True)
+def remove_leftovers(path: Path) -> None:
+    """Remove the temporary files of `path` whose process ran on this host and is gone."""
+    if os.name != "posix":
+        return  # whether a process runs cannot be asked there
+    name = re.compile(re.escape(_prefix(path)) + r"(\d+)-(\d+)\.part" + re.escape(path.suffix))
+    try:
+        found = [name.fullmatch(entry) for entry in os.listdir(path.parent)]
+    except OSError:
+        return  # no such folder, or one that may not be listed
+    for leftover in filter(None, found):
+        process, start = leftover.groups()
+        if not _alive(int(process), start):
+            path.with_name(leftover.group()).unlink(missing_ok=True)
 
 
-def _alive(process: int) -> bool:
+def _prefix(path: Path) -> str:
+    """What the temporary names of a file on this host begin with: `.STEM.wfluid-HOST-`.
+
+    A stem that leaves no room for the rest is cut, and told from others by a hash of it.
+    """
+    host = re.sub(r"[^\w.-]", "_", platform.node()).encode()[-HOST_LIMIT:].decode(errors="ignore")
+    rest = f".wfluid-{host}-"
+    numbers = len("4194304-00000000000000000000.part")  # the longest numbers of process and start
+    room = NAME_LIMIT - 1 - len(rest.encode()) - numbers - len(os.fsencode(path.suffix))
+    stem = path.stem
+    if len(os.fsencode(stem)) > room:
+        mark = hashlib.sha256(os.fsencode(stem)).hexdigest()[:16]
+        stem = os.fsencode(stem)[: max(0, room - len(mark))].decode(errors="ignore") + mark
+    return f".{stem}{rest}"
+
+
+def _started(process: int) -> str:
+    """When a process started [clock ticks since the system's start]; "0" where that is not known."""
+    try:
+        after_its_name = Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2]
+    except OSError:
+        return "0"
+    return after_its_name.split()[19].decode()  # field 22 of proc(5)
+
+
+def _alive(process: int, start: str) -> bool:
+    """Whether a process with this start still runs: its number may have gone to another since."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
     except (PermissionError, OverflowError):
         pass
-    return True
+    return "0" in (start, _started(process)) or start == _started(process)
