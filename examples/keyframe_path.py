@@ -1,8 +1,8 @@
 """A nose on a leash: one point follows a path, others are pinned.
 
-The raccoon's nose is told to be at eight places of a circle, a quarter of a second apart, while its eyes stay
-where they are: keyframes of section III of "Control Methods for Fluid-Based Image Warping" (Bonilla &
-Velho), several for one particle. `check()` asserts that it is at each of them in time.
+The raccoon's nose has eight targets on a circle, a quarter of a second apart, while its eyes are pinned:
+several keyframes of one particle (section III of "Control Methods for Fluid-Based Image Warping", Bonilla &
+Velho). `check()` asserts that the nose is at each target in time.
 
     python examples/keyframe_path.py --output keyframe_path.gif
 """
@@ -30,11 +30,11 @@ SIDE = 1024
 NOSE, EYES = (621, 451), ((577, 307), (722, 333))
 
 RADIUS, STOPS, SECONDS = 28.0, 8, 2.0
-"""Of the circle [px], places on it, and how long once round takes [s]."""
+"""Radius of the circle [px], targets on it, and duration of one turn [s]."""
 
 
 def places(stops=STOPS):
-    """Where the nose should be, and when: once round a circle above it, back to its place [px, s]."""
+    """Targets and times of the nose: once round a circle above it and back to its place [px, s]."""
     for n in range(1, stops + 1):
         turn = 2 * math.pi * n / STOPS
         at = NOSE[0] + RADIUS * math.sin(turn), NOSE[1] - RADIUS * (1 - math.cos(turn))
@@ -42,7 +42,7 @@ def places(stops=STOPS):
 
 
 def matched(cells=192, width=480, stops=STOPS, device=None):
-    """The forces that lead the nose round, or only to the first few stops."""
+    """The forces that lead the nose round, or only to the first few targets."""
     animation = Animation(
         read_picture(PICTURE),
         Fluid(viscosity=0.005),
@@ -60,7 +60,7 @@ def matched(cells=192, width=480, stops=STOPS, device=None):
 
 
 def check(match, stops=STOPS):
-    """The nose is at every place in time, to a quarter of a pixel of 512, and nothing folds; the figures."""
+    """Every target is reached in time, to a quarter of a pixel of 512, without a fold; the figures."""
     figures = {
         "residual_px": match.residual * SIDE,
         "keyframes": len(match.arrivals),

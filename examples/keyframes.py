@@ -1,10 +1,9 @@
-"""Figure 3: arrows on the cat, and the forces that make its points arrive where they point.
+"""Figure 3: arrows on the cat, and the forces that take its points to the arrows' tips.
 
 Particle keyframes (section III of "Control Methods for Fluid-Based Image Warping", Bonilla & Velho): eyes,
-nose, mouth and cheeks are sent along arrows, the forehead and the ears' roots are pinned. Nothing but the
-arrows is given; the forces are found with the adjoint's gradient. `check()` asserts that every point is
-within a quarter of a pixel of its place, followed by the flow and in the picture alike, and that nothing
-folds.
+nose, mouth and cheeks follow arrows, the forehead and the roots of the ears are pinned. Only the arrows are
+given; a search with the adjoint gradient finds the forces. `check()` asserts that every point is within a
+quarter of a pixel of its target, both along the flow and in the picture, and that nothing folds.
 
     python examples/keyframes.py --output keyframes.gif --plot keyframes.png
 """
@@ -35,10 +34,10 @@ ARROWS = {
     "left mouth": ((205, 262), (184, 250)),
     "right mouth": ((310, 262), (328, 251)),
 }
-"""Where points are, and where they should be [px]."""
+"""Points and their targets [px]."""
 
 PINS = ((235, 40), (60, 60), (392, 95))
-"""Points that stay [px]."""
+"""Pinned points [px]."""
 
 TOLERANCE = 0.25 / SIDE
 
@@ -57,7 +56,7 @@ def matched(cells=256, seconds=1.0, arrows=tuple(ARROWS), device=None):
 
 
 def check(match):
-    """Every point is at its place, in the flow and in the picture, and nothing folds; the figures."""
+    """Every target is reached, in the flow and in the picture, without a fold. Returns the figures."""
     figures = {
         "residual_px": match.residual * SIDE,
         "jacobian_min": match.jacobian[0],

@@ -1,10 +1,10 @@
 """Figure 7: a cat flows into a raccoon through six points of both.
 
 Warp and blend through particle keyframes (figure 7 of "Control Methods for Fluid-Based Image Warping",
-Bonilla & Velho): a flow takes eyes, nose, forehead and cheeks of the cat to those of the raccoon. In every
-frame the cat is seen through the flow so far, the raccoon through the flow still to come, so that features
-of both lie in one place. `check()` asserts that the ends are the pictures themselves, that points of both
-meet within half a pixel, that neither map folds, and that one map undoes the other.
+Bonilla & Velho): a flow takes eyes, nose, forehead and cheeks of the cat to those of the raccoon. Each frame
+shows the cat through the flow so far and the raccoon through the flow still to come, so that matching
+features lie at one place. `check()` asserts that the first and last frames are the pictures themselves, that
+matching points meet within half a pixel, that neither map folds, and that the maps are inverse to each other.
 
     python examples/morph.py --output morph.gif --strip morph.jpg
 """
@@ -27,15 +27,15 @@ STRIP = (0, 14, 24, 34, 48)
 """Frames shown side by side."""
 
 
-def morphing(cells=256, seconds=2.0, device=None, names=("cat.png", "raccoon_face.png"), **course):
-    """The morph; `course` says how it goes, as in `wfluid.morph`."""
+def morphing(cells=256, seconds=2.0, device=None, names=("cat.png", "raccoon_face.png"), **settings):
+    """The morph; `settings` are those of `wfluid.morph`."""
     cat, raccoon = (read_picture(IMAGES / name) for name in names)
     rows = np.array([[*row.source, *row.target] for row in read_points(IMAGES / "cat_to_raccoon.csv")])
-    return morph(cat, raccoon, rows / SIDE, seconds, cells=cells, device=device, **course)
+    return morph(cat, raccoon, rows / SIDE, seconds, cells=cells, device=device, **settings)
 
 
 def check(made, frames):
-    """The ends are the pictures, points meet, nothing folds, the maps undo one another; the figures."""
+    """The ends are the pictures, points meet, nothing folds, the maps are inverse. Returns the figures."""
     mean, most = made.inconsistency_px()
     qualities = [(frame.quality, frame.to_quality) for frame in frames]
     figures = {

@@ -27,8 +27,8 @@ def animation(periods=2.0, fps=15.0, cells=256, width=480, device=None):
     """The two oscillators on the raccoon, as an `Animation`."""
     picture = read_picture(PICTURE)
     duration = periods * PERIOD
-    whole = max(duration, PERIOD)  # a shorter run shows the beginning of the same motion
-    drawing = Drawing(picture.width, picture.height, whole)
+    longest = max(duration, PERIOD)  # a shorter run shows the beginning of the same motion
+    drawing = Drawing(picture.width, picture.height, longest)
     forces = [drawing.force(parse_force("push", push)) for push in (NOSE, MOUTH)]
     height = round(width * picture.height / picture.width)
     return Animation(
@@ -46,13 +46,13 @@ def animation(periods=2.0, fps=15.0, cells=256, width=480, device=None):
 def check(frames):
     """The nose swings along its arrow and stays near its place; areas are kept; nothing folds.
 
-    `frames` are those of `animation`, whole periods of them. Returns the figures asserted.
+    `frames` are those of `animation`, longest periods of them. Returns the figures asserted.
     """
     frames = list(frames)
     side = max(frames[0].picture.width, frames[0].picture.height)
     grid = frames[0].map.grid
     row, column = int(451 / 1024 / grid.hy), int(621 / 1024 / grid.hx)
-    # source_of looks back: the nose has moved to where the displacement is minus the way it went
+    # source_of is the backward map: where the nose is now, the displacement is minus its motion
     way = -1024 * np.array([frame.map.displacement[row, column] for frame in frames])
     along = way @ (22, 15) / AMPLITUDE
     across = way @ (-15, 22) / AMPLITUDE

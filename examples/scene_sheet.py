@@ -1,4 +1,4 @@
-"""The scenes of examples/scenes that are forces, small and side by side: what each control does.
+"""The force scenes of examples/scenes, small and side by side: what each control does.
 
 A scene is one TOML file; `wfluid render examples/scenes/vortex.toml -o vortex.gif` runs one of them.
 
@@ -30,13 +30,13 @@ def animations(cells=128, width=160, device=None):
     for path in sorted(SCENES.glob("*.toml")):
         settings = [f"fluid.cells={cells}", f"frames.width={width}", f"time.fps={FPS}"]
         scene = read_scene(path).with_values(settings)
-        if "keyframes" not in scene.tables:  # whose forces are searched for, on a fine grid
+        if "keyframes" not in scene.tables:  # their forces are searched for, on a fine grid
             found[path.stem] = stage(scene, device)
     return found
 
 
 def sheet(pictures, height):
-    """Pictures by name in rows of `COLUMNS`, all as wide, each cut or filled to a height, names below."""
+    """Named pictures of one width in rows of `COLUMNS`, cut or padded to one height, names below."""
     tiles = []
     for name, picture in pictures.items():
         tile = np.zeros((height + LABEL, picture.width, 3), dtype=np.float32)
@@ -52,7 +52,7 @@ def sheet(pictures, height):
 
 
 def check(frames):
-    """Everything moves, nothing folds, and areas change only where a scene says so.
+    """Everything moves, nothing folds, and areas change only in scenes that grow or shrink.
 
     `frames` are the lists of frames by scene. Returns the longest displacement of each [longer side].
     """

@@ -1,9 +1,9 @@
-"""What holds the nose? The gradient of its way with respect to the viscosity of every cell, over the picture.
+"""What holds the nose? The gradient of its displacement with respect to the viscosity of every cell.
 
-One force pushes the raccoon's nose. One run backward (the adjoint method of section III of "Control Methods
-for Fluid-Based Image Warping", Bonilla & Velho) tells for each of some ten thousand cells how much less
-(red) or more (blue) the nose would move if the picture were stiffer there. `check()` then does stiffen
-it: where the gradient says, the nose loses what was foretold, and more than from the same paint elsewhere.
+One force pushes the raccoon's nose. One backward pass (the adjoint method of section III of "Control Methods
+for Fluid-Based Image Warping", Bonilla & Velho) gives, for each of some ten thousand cells, how much less
+(red) or more (blue) the nose would move if the picture were stiffer there. `check()` then stiffens the
+picture there: the nose loses the predicted distance, and more than from the same paint elsewhere.
 
     python examples/sensitivity.py --output sensitivity.png
 """
@@ -37,7 +37,7 @@ VISCOSITY, SECONDS = 0.004, 0.25
 
 
 def nose_functional(cells=128, device=None):
-    """How far the nose goes along the push [longer side], as a function of every cell's viscosity."""
+    """The nose's displacement along the push [longer side], as a function of every cell's viscosity."""
     picture = read_picture(PICTURE)
     grid = Grid.for_picture(picture.width, picture.height, cells)
     along = np.array(PUSH) / np.hypot(*PUSH)
@@ -57,14 +57,14 @@ def nose_functional(cells=128, device=None):
 
 
 def sensitivity(functional):
-    """The way, and its derivative by the viscosity's logarithm, (ny, nx), a unit of area [1/longer side]."""
+    """The displacement, and its derivative by log viscosity per unit of area, (ny, nx) [1/longer side]."""
     way, gradient = functional.value_and_gradient(functional.start)
     grid = functional.grid
     return way, gradient.reshape(grid.ny, grid.nx) / np.sqrt(grid.hx * grid.hy)
 
 
 def way_when_stiffer(functional, where, factor):
-    """The way once the viscosity of some cells is multiplied by a factor."""
+    """The displacement after the viscosity of some cells is multiplied by a factor."""
     values = np.where(where, factor, 1.0) * VISCOSITY
     fluid = replace(functional.setup(functional.start).fluid, viscosity=Painted(values))
     setup = replace(functional.setup(functional.start), fluid=fluid)
@@ -72,7 +72,7 @@ def way_when_stiffer(functional, where, factor):
 
 
 def check(cells=96, device=None):
-    """The gradient foretells what stiffening does, and finds where it does most. Returns the figures."""
+    """The gradient predicts the effect of stiffening, and where it is largest. Returns the figures."""
     functional = nose_functional(cells, device)
     way, by = sensitivity(functional)
     grid = functional.grid

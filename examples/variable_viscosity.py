@@ -1,9 +1,9 @@
-"""Stiff where the picture says so, still where it must not move: one force, three ways to hold a face.
+"""Painted viscosity and freezing: the same force on three fluids.
 
-Section III of "Control Methods for Fluid-Based Image Warping" (Bonilla & Velho): the same oscillating
-force on the raccoon with one viscosity everywhere; with a painted viscosity that stiffens the mask around
-its eyes 10,000 times, so that they are carried along but keep their shape; and with its eyes frozen, which
-viscosity cannot do. Below each animation the picture that says so.
+Section III of "Control Methods for Fluid-Based Image Warping" (Bonilla & Velho): an oscillating force on the
+raccoon with one viscosity everywhere; with a painted viscosity that makes the mask around its eyes 10,000
+times stiffer, so that the eyes move but keep their shape; and with frozen eyes, which viscosity cannot do.
+Below each animation is the picture that was painted.
 
     python examples/variable_viscosity.py --output variable_viscosity.gif
 """
@@ -29,7 +29,7 @@ STEPS_PER_SECOND = 24
 
 
 def fluids():
-    """What the picture is made of in each of the three: by name."""
+    """The three fluids by name."""
     stiff = Painted(read_picture(STIFF), scale=CONTRAST * VISCOSITY, floor=VISCOSITY)
     still = Freeze(read_picture(STILL), strength=DRAG)
     return {
@@ -60,7 +60,7 @@ def green_strain(frame):
 
 
 def check(frames_of_each):
-    """The stiff mask keeps its shape, the frozen eyes their place, and nothing folds.
+    """The stiff mask keeps its shape, the frozen eyes stay in place, and nothing folds.
 
     `frames_of_each` holds the frames of each animation. Returns the figures asserted.
     """
@@ -89,7 +89,7 @@ def check(frames_of_each):
 
 
 def _near(where, cells):
-    """Cells within `cells` of those where it is so."""
+    """The cells of a mask, and those within `cells` of it."""
     out = where.copy()
     for _ in range(cells):
         out[1:] |= out[:-1]
@@ -100,7 +100,7 @@ def _near(where, cells):
 
 
 def sheet(frames):
-    """The three frames of one time, and below them the pictures that say what is stiff and still."""
+    """The three frames of one time, and below them the painted viscosity and the freeze mask."""
     top = [labelled(frame.picture.pixels, name) for frame, name in zip(frames, fluids(), strict=True)]
     height, width = top[0].shape[:2]
     dim = 0.2 * read_picture(IMAGES / "raccoon.jpg").resized(width, height).pixels
