@@ -6,6 +6,7 @@ import inspect
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -33,11 +34,19 @@ FLOOR = {name: number for number, names in enumerate(FLOORS, start=1) for name i
 @pytest.mark.parametrize("name", [name for name in wfluid.__all__ if name != "__version__"])
 def test_every_public_name_exists_and_is_documented(name):
     thing = getattr(wfluid, name)
+    assert thing is getattr(import_module(wfluid._HOMES[name]), name)
     assert inspect.getdoc(thing)
     if inspect.isclass(thing):
         for attribute, value in vars(thing).items():
             if not attribute.startswith("_") and inspect.isfunction(value):
                 assert inspect.getdoc(value), f"{name}.{attribute} has no docstring"
+
+
+def test_the_types_of_every_public_name_are_checked():
+    """`.ci/run` has mypy and pyright check tests/typing/public_names.py."""
+    tree = ast.parse((ROOT / "tests/typing/public_names.py").read_text())
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert {*wfluid.__all__} - used == {"__version__"}
 
 
 def test_every_package_is_installed():

@@ -21,7 +21,7 @@ from wfluid.domain.piecewise import finite, hats, smoothstep
 Slopes = dict[str, np.ndarray]
 """Derivatives by numbers: each under its number's attribute path, "factors[0].period", and in its shape."""
 
-Scalars = TypeVar("_Numbers", float, np.ndarray)
+Scalars = TypeVar("Scalars", float, np.ndarray)
 
 _NODES, _WEIGHTS = (tuple(float(x) for x in values) for values in np.polynomial.legendre.leggauss(5))
 
@@ -32,8 +32,10 @@ _PIECES = 1000
 class Envelope(ABC):
     """A force's course in time."""
 
-    span: float = math.inf
-    """Length over which its value is near a polynomial of low degree [s]."""
+    @property
+    def span(self) -> float:
+        """Length over which its value is near a polynomial of low degree [s]."""
+        return math.inf
 
     @abstractmethod
     def value(self, t: float) -> float:
@@ -384,7 +386,7 @@ class Product(Envelope):
         """Exact for one factor within windows; an instant takes the others' value at its moment."""
         for n, factor in enumerate(self.factors):
             if isinstance(factor, Instantaneous):
-                return self._without(n).value(factor.at) * factor.integral(start, end)
+                return self._without(n, factor).value(factor.at) * factor.integral(start, end)
         start, end, rest = self._within(start, end)
         if end <= start:
             return 0.0
@@ -392,9 +394,9 @@ class Product(Envelope):
             return super().integral(start, end)
         return self.gain * (self.factors[rest[0]].integral(start, end) if rest else end - start)
 
-    def _without(self, n: int) -> Product:
+    def _without(self, n: int, instant: Instantaneous) -> Product:
         """The product where instant n is but a 1, from its moment on."""
-        return Product((*self.factors[:n], Constant(self.factors[n].at), *self.factors[n + 1 :]), self.gain)
+        return Product((*self.factors[:n], Constant(instant.at), *self.factors[n + 1 :]), self.gain)
 
     def _within(self, start: float, end: float) -> tuple[float, float, list[int]]:
         """The part of a step within the windows [s], and which factors are none."""
@@ -427,7 +429,7 @@ class Product(Envelope):
         """Exact where `integral` is; with respect to "gain", and the factors' own as "factors[n].name"."""
         for n, factor in enumerate(self.factors):
             if isinstance(factor, Instantaneous):
-                return scaled(self._without(n).value_slopes(factor.at), factor.integral(start, end))
+                return scaled(self._without(n, factor).value_slopes(factor.at), factor.integral(start, end))
         start, end, rest = self._within(start, end)
         if len(rest) > 1 and end > start:
             return super().slopes(start, end)
@@ -444,7 +446,8 @@ def product(*factors: Envelope | float) -> Envelope:
         ValueError: two instants, or a number that is not finite.
         TypeError: something that is neither.
     """
-    gain, envelopes = 1.0, []
+    gain = 1.0
+    envelopes: list[Envelope] = []
     for factor in factors:
         if isinstance(factor, Product):
             gain *= factor.gain

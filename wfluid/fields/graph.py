@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from functools import wraps
+from typing import ParamSpec, TypeVar
 
 import warp as wp
 
@@ -15,12 +16,15 @@ from wfluid.system.threads import ThreadTeam
 LAUNCHES = threading.RLock()
 """Held by whatever calls Warp but for replays: a capture takes in what any thread allocates or launches."""
 
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
-def exclusive(method: Callable) -> Callable:
+
+def exclusive(method: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Hold `LAUNCHES` while `method` runs."""
 
     @wraps(method)
-    def held(*arguments, **settings):
+    def held(*arguments: Arguments.args, **settings: Arguments.kwargs) -> Result:
         with LAUNCHES:
             return method(*arguments, **settings)
 

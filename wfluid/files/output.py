@@ -68,7 +68,10 @@ def open_output(
 class HasPicture(Protocol):
     """Anything that shows a picture, such as a `Frame`."""
 
-    picture: Picture
+    @property
+    def picture(self) -> Picture:
+        """The picture to write."""
+        ...
 
 
 def write_animation(

@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from wfluid.domain.paths import Place
+
 
 class Objective:
     """A number that a run has. Objectives add and are multiplied by numbers."""
@@ -93,9 +95,9 @@ class ParticleMisfit(ParticleObjective):
         ValueError: places that are not (n, 2) finite numbers, as many as points; negative weights.
     """
 
-    points: np.ndarray
+    points: np.ndarray | Sequence[Place]
     """Where the particles begin [longer side], (n, 2)."""
-    destinations: np.ndarray
+    destinations: np.ndarray | Sequence[Place]
     """Where they should be [longer side], (n, 2)."""
     time: float
     """When [s]."""
@@ -135,7 +137,7 @@ class ParticleFunction(ParticleObjective):
         ValueError: points that are not (n, 2) finite numbers, or no times.
     """
 
-    points: np.ndarray
+    points: np.ndarray | Sequence[Place]
     """Where the particles begin [longer side], (n, 2)."""
     function: Callable[[float, np.ndarray], tuple[float, np.ndarray]]
     """Of the time [s] and the places (n, 2) [longer side]: a value, and its gradient (n, 2). Its values at

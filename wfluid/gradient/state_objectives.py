@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from wfluid.domain.paths import Place
 from wfluid.fields.arrays import from_numpy, vector
 from wfluid.fields.state import State
 from wfluid.gradient.objectives import Objective, finite_array, places_of
@@ -182,7 +183,7 @@ class WarpObjective(StateObjective):
     """Launches kernels that read the state's arrays (units as `State` says) and add to `value[0]`."""
     time: float
     """When [s]."""
-    points: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    points: np.ndarray | Sequence[Place] = field(default_factory=lambda: np.empty((0, 2)))
     """Where particles begin [longer side], (n, 2), whose places are the state's p_x and p_y."""
 
     def __post_init__(self) -> None:

@@ -67,9 +67,10 @@ class Fluid:
         if len(set(self.density_names)) < len(self.densities):
             raise ValueError(f"densities {', '.join(self.density_names)}: two have one name")
         _one_of("scheme", self.scheme, SCHEMES)
-        if self.solver is None:
-            object.__setattr__(self, "solver", "jacobi" if self.scheme == "paper" else "multigrid")
-        _one_of("solver", self.solver, SOLVERS)
+        default = "jacobi" if self.scheme == "paper" else "multigrid"
+        solver = default if self.solver is None else self.solver
+        _one_of("solver", solver, SOLVERS)
+        object.__setattr__(self, "solver", solver)
         for name in ("pressure_cycles", "sweeps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) >= 1):
                 raise ValueError(f"{name} {getattr(self, name)}: expected a whole number from 1 on")
@@ -90,7 +91,8 @@ class Fluid:
     @property
     def separable(self) -> bool:
         """Whether the two components of the velocity may be diffused apart from each other."""
-        return self.uniform and Wall.NO_SLIP not in (self.walls.x, self.walls.y)
+        walls = Walls.parse(self.walls)
+        return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
 
 
 def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:

@@ -60,7 +60,7 @@ class Force(ABC):
 
     def under(self, envelope: Envelope) -> Force:
         """The same force with its envelope multiplied by another."""
-        return replace(self, envelope=product(self.envelope, envelope))
+        return replace(self, envelope=product(self.envelope, envelope))  # type: ignore[type-var]  # a dataclass
 
 
 class LocalForce(Force):

@@ -54,6 +54,8 @@ class ImageForce(FieldForce):
     """Where it acts: a factor painted over the picture."""
     radius: float = DEFAULT_RADIUS
     """Sigma of the blur before slopes are taken [longer side]; 0 for none."""
+    _values: np.ndarray = field(init=False, repr=False)
+    """Intensities (height, width), or vectors (height, width, 2)."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -49,8 +49,10 @@ class Painted:
     """What is painted, (height, width) of the painting."""
 
     def __post_init__(self) -> None:
-        is_picture = isinstance(self.picture, Picture)
-        values = intensity(self.picture) if is_picture else np.asarray(self.picture, dtype=np.float64)
+        if isinstance(self.picture, Picture):
+            values = intensity(self.picture)
+        else:
+            values = np.asarray(self.picture, dtype=np.float64)
         if values.ndim != 2 or not values.size:
             raise ValueError(f"painted values of shape {values.shape}: expected (height, width)")
         _finite_from_zero("painted values", values)
@@ -143,7 +145,7 @@ class Freeze:
         return np.expm1(self.paint.sample(grid) * math.log1p(self.strength))
 
 
-def as_quantity(name: str, what: Quantity | np.ndarray | Picture) -> Quantity:
+def as_quantity(name: str, what: object) -> Quantity:
     """A quantity, from what a user may give for one.
 
     Raises:
@@ -163,7 +165,7 @@ def as_quantity(name: str, what: Quantity | np.ndarray | Picture) -> Quantity:
     return float(what)
 
 
-def sample_at(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
+def sample_at(what: Quantity | np.ndarray, grid: Grid, t: float) -> np.ndarray | float:
     """A quantity at time t [s]: one number, or (ny, nx) for the grid's cells.
 
     Raises:
@@ -175,7 +177,8 @@ def sample_at(what: Quantity, grid: Grid, t: float) -> np.ndarray | float:
         return what.sample(grid)
     if isinstance(what, Keyed):
         return what.at(t, grid)
-    return sample_at(as_quantity(f"viscosity at {t:g} s", what(t)), grid, t)
+    given = what(t) if callable(what) else what
+    return sample_at(as_quantity(f"viscosity at {t:g} s", given), grid, t)
 
 
 def check_painted(viscosity: np.ndarray | float) -> None:

@@ -299,7 +299,7 @@ def _descend(function: _Counted, state: Iterate, settings: Settings) -> tuple[Po
         if point := _along(function, state, direction, settings):
             return point, True
     point = _along(function, state, _downhill(state.gradient, settings.first_step), settings)
-    return point and (point, False)
+    return None if point is None else (point, False)
 
 
 def _along(function: _Counted, state: Iterate, direction: np.ndarray, settings: Settings) -> Point | None:
@@ -315,7 +315,7 @@ def _along(function: _Counted, state: Iterate, direction: np.ndarray, settings: 
     lowest = min(state.values)
     ceiling = lowest + settings.noise * abs(lowest)
     found = search(sample, start, ceiling, rules=Rules(settings.decrease, settings.curvature)).sample
-    return found and found.point
+    return None if found is None else found.point
 
 
 @np.errstate(all="ignore")
@@ -355,11 +355,14 @@ class _Counted:
         self.value_and_gradient = value_and_gradient
         self.limit = limit
         self.evaluations = 0
-        self.best: Point | None = None
+
+    best: Point
+    """The lowest point so far; `begin` or `resume` gives the first."""
 
     def begin(self, x: np.ndarray) -> Iterate:
         """The state at a start."""
-        point = self.best = self(x)
+        point = self.best = self._evaluate(x)
+        self.evaluations = 1
         return Iterate(point, point, (), (), (point.value,), (point.steepness,), self.evaluations)
 
     def resume(self, state: Iterate) -> Iterate:
@@ -373,7 +376,7 @@ class _Counted:
             raise _Spent
         self.evaluations += 1
         point = self._evaluate(x)
-        if self.best is not None and point.is_finite and point.value < self.best.value:
+        if point.is_finite and point.value < self.best.value:
             self.best = point
         return point
 

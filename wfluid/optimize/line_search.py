@@ -167,7 +167,8 @@ class _Interval:
         self.left = RETREAT
         enough = self.start.value + self.tilt * trial.step
         tilt = self.tilt if enough < trial.value <= self.low.value else 0.0
-        low, high, new = (sample and sample.tilted(tilt) for sample in (self.low, self.high, trial))
+        low, new = self.low.tilted(tilt), trial.tilted(tilt)
+        high = None if self.high is None else self.high.tilted(tilt)
 
         advance = trial.step - low.step
         least = trial.step + (SHORTEST_GROWTH * advance if low.step else 0.0)
@@ -184,13 +185,13 @@ class _Interval:
                 self.high = self.low
             self.low = trial
         if self.high is not None:
-            return self._inside(step)
+            return self._inside(step, self.high)
         step = min(max(step, least), most) if math.isfinite(step) else most
         return step if step < self.wall else (self.low.step + self.wall) / 2
 
-    def _inside(self, step: float) -> float:
+    def _inside(self, step: float, high: Sample) -> float:
         """A step within the bracket: the one given unless it is outside or the bracket shrinks too slowly."""
-        ends = sorted((self.low.step, self.high.step))
+        ends = sorted((self.low.step, high.step))
         width = ends[1] - ends[0]
         is_slow = width >= CONTRACTION * self.widths[0]
         self.widths = self.widths[1], width

@@ -69,9 +69,10 @@ def resample(values: np.ndarray, width: int, height: int, filter: str = "triangl
     source = oiio.ImageBuf(np.ascontiguousarray(values, dtype=np.float32).reshape(*values.shape[:2], -1))
     roi = oiio.ROI(0, width, 0, height, 0, 1, 0, source.nchannels)
     result = oiio.ImageBufAlgo.resize(source, filter, roi=roi)
-    if result.has_error:
+    resized = None if result.has_error else result.get_pixels(oiio.FLOAT)
+    if resized is None:
         raise PictureError(f"resizing to {width} x {height} failed ({first_line(result.geterror())})")
-    return result.get_pixels(oiio.FLOAT).reshape(height, width, *values.shape[2:])
+    return resized.reshape(height, width, *values.shape[2:])
 
 
 def as_stored(picture: Picture) -> np.ndarray:

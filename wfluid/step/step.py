@@ -153,7 +153,7 @@ class Step:
 
         Only how the solves go is known then: each step must take its viscosity, and `follow_medium`.
         """
-        self.medium.expect(times, dt)
+        self.medium.bound_over(times, dt)
         return self.diffusion.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
 
     def follow_medium(self, state: State | None = None) -> None:
