@@ -3,6 +3,7 @@
 import ast
 import graphlib
 import inspect
+import re
 import subprocess
 import sys
 import tomllib
@@ -74,6 +75,52 @@ def test_device_code_knows_no_host_code():
     for path in (ROOT / "kernels").rglob("*.py"):
         for module in imported_by(path):
             assert module.startswith("wfluid.kernels"), f"{path.name} imports {module}"
+
+
+SYMBOL = re.compile(
+    r"""[A-Z][a-z]?(?:_\w+)?\s+(?:[-+*/]?=|[-+*/]\s)   # X = …, X += …, V - grad q
+      | (?:Out|Mu|Beta|Alpha|Lambda|Length|Ratio|Sinc)(?:\s+[-+]?=|\()
+      | (?:Dt|Rz)\b
+      | [A-Z][xy]\s*\(                               # Ax (x_west + …
+      | [B-HJ-Z]\s+(?:mod|rounded|of)\b""",
+    re.VERBOSE,
+)
+"""A formula, or a symbol of one letter, that begins with a capital."""
+
+
+@pytest.mark.parametrize("text", ["X = A^-1 b", "Out = f", "V - grad q", "Ax (x_west)", "Rz of", "N rounded"])
+def test_a_capitalised_symbol_is_found(text):
+    assert SYMBOL.match(text)
+
+
+@pytest.mark.parametrize("folder", ["kernels", "wfluid"])
+def test_docstrings_leave_symbols_as_they_are(folder):
+    """`ax` is a coefficient, `A x` an operator's product: a docstring begins with the symbol itself."""
+    wrong = [
+        f"{path.relative_to(ROOT)}: {text.splitlines()[0]}"
+        for path in (ROOT / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        for text in [ast.get_docstring(node) or ""]
+        if SYMBOL.match(text)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_arrays_are_made_and_written_in_one_file():
+    """What `fields/arrays` does holds the lock that keeps it out of another thread's capture."""
+    makes = {"zeros", "ones", "full", "empty", "array", "copy", "clone", "zeros_like", "empty_like", "launch"}
+    writes = {"assign", "fill_"}
+    wrong = []
+    for path in sorted((ROOT / "wfluid").rglob("*.py")):
+        if path.relative_to(ROOT) == Path("wfluid/fields/arrays.py"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                of_warp = isinstance(node.func.value, ast.Name) and node.func.value.id == "wp"
+                if (of_warp and node.func.attr in makes) or node.func.attr in writes:
+                    wrong.append(f"{path.relative_to(ROOT)}:{node.lineno} calls {node.func.attr}")
+    assert not wrong, "\n".join(wrong)
 
 
 def packages_imported_by(path):

@@ -13,40 +13,12 @@ back to the cells that they copy (`ghosts.fold_rows`).
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import gather, inside
 from wfluid.kernels.cell.program import adjoint_cells
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
 from wfluid.kernels.step.advection import mean, velocity_centre
-from wfluid.kernels.step.interpolation import bilinear, inner_weight, kept_inside, locate, outer_weight
-
-Four = wp.types.vector(4, Real)
-"""A number for each of four points in a row."""
-
-
-@wp.func
-def cubic_weights(t: Real):
-    """Catmull-Rom weights of four points, t past the second."""
-    s = Real(1.0) - t
-    return Four(outer_weight(t), inner_weight(t), inner_weight(s), outer_weight(s))
-
-
-@wp.func
-def outer_slope(t: Real):
-    """Derivative of `outer_weight`."""
-    return Real(-0.5) + t * (Real(2.0) - Real(1.5) * t)
-
-
-@wp.func
-def inner_slope(t: Real):
-    """Derivative of `inner_weight`."""
-    return t * (Real(-5.0) + Real(4.5) * t)
-
-
-@wp.func
-def cubic_slopes(t: Real):
-    """Derivatives of `cubic_weights`."""
-    s = Real(1.0) - t
-    return Four(outer_slope(t), inner_slope(t), -inner_slope(s), -outer_slope(s))
+from wfluid.kernels.step.interpolation import bilinear, cubic_slopes, cubic_weights, kept_inside, locate
 
 
 @wp.func
@@ -77,7 +49,7 @@ def place_feet(
     k = inside(k)
     column, fraction_x = locate(i, mean(foot_x, k, before), nx, periodic_x)
     row, fraction_y = locate(j, mean(foot_y, k, before), ny, periodic_y)
-    at[k] = (row + 2) * pitch + column + 2
+    at[k] = index(column, row, pitch)
     tx[k] = fraction_x
     ty[k] = fraction_y
 
@@ -242,10 +214,10 @@ def place_middles(
     row, ty = locate(j, y, ny, periodic_y)
     face_column, face_tx = locate(i, x + half, nx, periodic_x)
     face_row, face_ty = locate(j, y + half, ny, periodic_y)
-    u_at[k] = (row + 2) * pitch + face_column + 2
+    u_at[k] = index(face_column, row, pitch)
     u_tx[k] = face_tx
     u_ty[k] = ty
-    v_at[k] = (face_row + 2) * pitch + column + 2
+    v_at[k] = index(column, face_row, pitch)
     v_tx[k] = tx
     v_ty[k] = face_ty
 

@@ -10,10 +10,11 @@ are all that is needed (`wfluid.blobs` puts them together); they are summed alon
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
-from wfluid.kernels.solve.sums import LANES, Lane
+from wfluid.kernels.solve.sums import LANES, Lane, total_of_lanes
 from wfluid.kernels.step.forces import in_profile
 
 ORDERS = wp.constant(5)
@@ -47,7 +48,7 @@ def row_moments(
         sum2 = Lane()
         sum3 = Lane()
         sum4 = Lane()
-        row = (j + 2) * pitch + 2
+        row = index(0, j, pitch)
         table = in_profile(n, 0, pitch_x)
         whole = (end - first) // LANES * LANES + first
         for i in range(first, whole, LANES):
@@ -68,20 +69,11 @@ def row_moments(
             sum3[0] += value * r * r * r
             sum4[0] += value * r * r * r * r
         at = ORDERS * t
-        sums[at] = total(sum0)
-        sums[at + 1] = total(sum1)
-        sums[at + 2] = total(sum2)
-        sums[at + 3] = total(sum3)
-        sums[at + 4] = total(sum4)
-
-
-@wp.func
-def total(part: Lane):
-    """Sum of the lanes."""
-    value = Real(0.0)
-    for lane in range(LANES):
-        value += part[lane]
-    return value
+        sums[at] = total_of_lanes(sum0)
+        sums[at + 1] = total_of_lanes(sum1)
+        sums[at + 2] = total_of_lanes(sum2)
+        sums[at + 3] = total_of_lanes(sum3)
+        sums[at + 4] = total_of_lanes(sum4)
 
 
 @adjoint_lines
@@ -173,6 +165,6 @@ def effort_added(
     # outputs
     out: Field,
 ):
-    """Out = f_bar + factor (pushed - f): with the gradient of half the square of what forces gained."""
+    """out = f_bar + factor (pushed - f): with the gradient of half the square of what forces gained."""
     k = inside(k)
     out[k] = f_bar[k] + factor * (pushed[k] - f[k])

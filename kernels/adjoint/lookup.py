@@ -15,10 +15,11 @@ and there the slope of the side after them.
 """
 
 import warp as wp
-from wfluid.kernels.adjoint.advection import cubic_slopes, cubic_weights
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
 from wfluid.kernels.cell.program import adjoint_cells
 from wfluid.kernels.cell.real import Field, Indices, Real, RowIndex
+from wfluid.kernels.step.interpolation import cubic_slopes, cubic_weights
 from wfluid.kernels.view.lookup import FAR, Pixel, Pixels, at_edge, whole_and_fraction
 
 
@@ -142,7 +143,7 @@ def stretch_x_adjoint(
     """
     k = inside(k)
     i = entry(i)
-    at = (j + 2) * pitch + 2
+    at = index(0, j, pitch)
     total = Real(0.0)
     for n in range(first[i], first[entry(i + 1)]):
         total += gather(weight, n) * gather(source_bar, at + column[entry(n)])
@@ -170,5 +171,5 @@ def stretch_y_adjoint(
     k = inside(k)
     total = Real(0.0)
     for n in range(first, end):
-        total += gather(weight, n) * gather(out_bar, (row[entry(n)] + 2) * pitch + i + 2)
+        total += gather(weight, n) * gather(out_bar, index(i, row[entry(n)], pitch))
     d_bar[k] = d_bar[k] + total

@@ -1,6 +1,7 @@
 """Misfits of fields, 1/2 sum w (f - target)^2, with their gradients w (f - target)."""
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, inside
 from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
 from wfluid.kernels.cell.real import Field, Real
@@ -36,7 +37,7 @@ def row_misfits(
     rows: Field,
 ):
     """Entry first + t: the sum of weight |shown - target|^2 over row t of the pixels, all four channels."""
-    at = (t + 2) * pitch + 2
+    at = index(0, t, pitch)
     total = Pixel()
     for i in range(nx):
         left = shown[entry(at + i)] - target[entry(at + i)]
@@ -74,7 +75,7 @@ def row_squares(
     rows: Field,
 ):
     """Entry first + t: the sum of (f - target)^2 over row t."""
-    at = (t + 2) * pitch + 2
+    at = index(0, t, pitch)
     total = Real(0.0)
     for i in range(nx):
         left = f[at + i] - target[at + i]

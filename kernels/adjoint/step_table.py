@@ -45,7 +45,7 @@ def take(
     # outputs
     out: Field,
 ):
-    """Out = the row that is `ahead` of the step's."""
+    """out = the row that is `ahead` of the step's."""
     copy_from(t, table, step[0] + ahead, size, chunk, out)
 
 
@@ -60,7 +60,7 @@ def take_indices(
     # outputs
     out: Indices,
 ):
-    """Out = the row that is `ahead` of the step's."""
+    """out = the row that is `ahead` of the step's."""
     copy_indices_from(t, table, step[0] + ahead, size, chunk, out)
 
 
@@ -80,7 +80,7 @@ def give(
 
 
 @adjoint_lines
-def copied(
+def copy(
     t: int,
     f: Field,
     size: int,
@@ -88,7 +88,7 @@ def copied(
     # outputs
     out: Field,
 ):
-    """Out = f."""
+    """out = f."""
     copy_from(t, f, 0, size, chunk, out)
 
 

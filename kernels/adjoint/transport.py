@@ -1,11 +1,12 @@
 """The adjoint of transport (`transport`): densities and points; the map's is `advection_adjoint`'s."""
 
 import warp as wp
-from wfluid.kernels.adjoint.advection import bilinear_rises, cubic_rises, cubic_weights
+from wfluid.kernels.adjoint.advection import bilinear_rises, cubic_rises
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
 from wfluid.kernels.cell.real import Field, Real, Uniform
-from wfluid.kernels.step.interpolation import cubic, locate
+from wfluid.kernels.step.interpolation import cubic, cubic_weights, locate
 from wfluid.kernels.step.transport import velocity_at, within
 
 
@@ -70,7 +71,7 @@ def carry_density_adjoint(
         y = foot_y[k]
         column, tx = locate(i, x, nx, periodic_x)
         row, ty = locate(j, y, ny, periodic_y)
-        at = (row + 2) * pitch + column + 2
+        at = index(column, row, pitch)
         least = at
         most = at
         for n in range(1, 4):
@@ -118,24 +119,10 @@ def carried_along_adjoint(
         y = d_y[k]
         column, tx = locate(i, x, nx, periodic_x)
         row, ty = locate(j, y, ny, periodic_y)
-        at = (row + 2) * pitch + column + 2
+        at = index(column, row, pitch)
         along_x, along_y = bilinear_adjoint(f, at, pitch, tx, ty, out_bar[k], f_bar)
         d_x_bar[k] += along_x * moves(i, x, nx, periodic_x)
         d_y_bar[k] += along_y * moves(j, y, ny, periodic_y)
-
-
-@adjoint_cells
-def add(
-    i: int,
-    j: int,
-    k: int,
-    f: Field,
-    # outputs
-    out: Field,
-):
-    """Add a field, in place."""
-    k = inside(k)
-    out[k] = out[k] + f[k]
 
 
 @wp.func
@@ -160,8 +147,8 @@ def velocity_at_adjoint(
     row, ty = locate(0, y - half, ny, periodic_y)
     column, tx = locate(0, x - half, nx, periodic_x)
     face_row, face_ty = locate(0, y, ny, periodic_y)
-    on_u = (row + 2) * pitch + face_column + 2
-    on_v = (face_row + 2) * pitch + column + 2
+    on_u = index(face_column, row, pitch)
+    on_v = index(column, face_row, pitch)
     u_x, u_y = cubic_adjoint(u, on_u, pitch, face_tx, ty, along_x, u_bar)
     v_x, v_y = cubic_adjoint(v, on_v, pitch, tx, face_ty, along_y, v_bar)
     x_bar = u_x * moves(0, x, nx, periodic_x) + v_x * moves(0, x - half, nx, periodic_x)

@@ -1,4 +1,4 @@
-"""The gradient with respect to viscosity (`viscosity`, `relaxation`).
+"""The gradient with respect to viscosity (`solve/stress`, `solve/five_point`).
 
 With A v = b solved, and A lambda = v_bar, an objective changes with mu as -<lambda, (dA/dmu) v>.
 <lambda, A v> is the power that the stress of v would do on the flow lambda: mu times the product of their
@@ -9,12 +9,13 @@ import warp as wp
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import adjoint_cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
+from wfluid.kernels.step.differences import gradient_x, gradient_y, laplacian_c
 
 
 @wp.func
-def shear_at(u: Field, v: Field, k: int, pitch: int, over_hx: Real, over_hy: Real):
+def shear_n(u: Field, v: Field, k: int, pitch: int, over_hx: Real, over_hy: Real):
     """Shear rate du/dy + dv/dx at the node where cell k begins."""
-    return over_hy * (u[k] - u[inside(k - pitch)]) + over_hx * (v[k] - v[inside(k - 1)])
+    return gradient_y(u, k, pitch, over_hy) + gradient_x(v, k, over_hx)
 
 
 @adjoint_cells
@@ -40,13 +41,14 @@ def take_dissipation(
     """
     k = inside(k)
     south = inside(k + pitch)
-    stretch_x = inverse_hx * (u[k + 1] - u[k]) * inverse_hx * (lambda_u[k + 1] - lambda_u[k])
-    stretch_y = inverse_hy * (v[south] - v[k]) * inverse_hy * (lambda_v[south] - lambda_v[k])
+    # each strain of v is the factor of that of lambda: one product, in one order
+    stretch_x = gradient_x(lambda_u, k + 1, gradient_x(u, k + 1, inverse_hx) * inverse_hx)
+    stretch_y = gradient_y(lambda_v, south, pitch, gradient_y(v, south, pitch, inverse_hy) * inverse_hy)
     shears = Real(0.0)
     for m in range(4):
         node = k + m % 2 + m // 2 * pitch
-        of_v = shear_at(u, v, node, pitch, inverse_hx, inverse_hy)
-        of_lambda = shear_at(lambda_u, lambda_v, node, pitch, inverse_hx, inverse_hy)
+        of_v = shear_n(u, v, node, pitch, inverse_hx, inverse_hy)
+        of_lambda = shear_n(lambda_u, lambda_v, node, pitch, inverse_hx, inverse_hy)
         shears += of_v * of_lambda
     power = Real(2.0) * (stretch_x + stretch_y) + Real(0.25) * shears
     mu_bar[k] = mu_bar[k] - dt * power
@@ -68,7 +70,4 @@ def add_diffused(
 ):
     """Add lambda dt Lap f to mu_bar, in place, for one component and constant viscosity; a = 1 / h^2."""
     k = inside(k)
-    north = inside(k - pitch)
-    south = inside(k + pitch)
-    across = ax * (f[k - 1] - f[k] + f[k + 1] - f[k]) + ay * (f[north] - f[k] + f[south] - f[k])
-    mu_bar[k] = mu_bar[k] + lambda_f[k] * dt * across
+    mu_bar[k] = mu_bar[k] + lambda_f[k] * dt * laplacian_c(f, k, pitch, ax, ay)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import warp as wp
+
 HALO = 2
 """Ghost cells on each side of a field: what a cubic stencil at a wall reaches."""
 
@@ -11,8 +13,14 @@ to a multiple of it stays cheap."""
 
 
 def whole_spans(n: int) -> int:
-    """N rounded up to whole spans: the room a row, or a table over columns, takes."""
+    """n rounded up to whole spans: the room a row, or a table over columns, takes."""
     return -(-n // SPAN) * SPAN
+
+
+@wp.func
+def index(column: int, row: int, pitch: int):
+    """Where the cell in a column and a row lies in a field; both count from -`HALO` on."""
+    return (row + 2) * pitch + column + 2
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from collections.abc import Callable, Sequence
 
 import warp as wp
 from wfluid.kernels.cell.layout import SPAN, Layout
+from wfluid.kernels.cell.lock import exclusive
 from wfluid.kernels.cell.real import Field, Indices, Real, RowIndex, RowReal, Uniform
 from wfluid.kernels.cell.strips import Strip, share, strips_meet
 
@@ -54,6 +55,7 @@ class Program:
         self.kernels = kernels
         self.span = span
 
+    @exclusive
     def launch(
         self,
         layout: Layout,
@@ -92,6 +94,7 @@ class Lines:
     def __init__(self, kernels: dict[str, wp.Kernel]):
         self.kernels = kernels
 
+    @exclusive
     def launch(
         self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence, turn: int | None = None
     ) -> None:
@@ -229,6 +232,7 @@ def module_of(kind: str, name: str = FORWARD) -> wp.Module:
 _meeting = wp.kernel(strips_meet, module=module_of("cpu"))
 
 
+@exclusive
 def strips(count: int, device: wp.Device) -> list[Strip]:
     """As many strips of a CPU, to capture the same launches with each."""
     counter = wp.zeros(2, dtype=wp.int32, device=device)

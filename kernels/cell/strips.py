@@ -18,6 +18,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 import warp as wp
+from wfluid.kernels.cell.lock import LAUNCHES
 
 SHARED_LINES = 48
 """Rows from which on a launch is shared: fewer take less time than a meeting."""
@@ -131,7 +132,8 @@ def alone(work: Callable[[], None]) -> None:
     """Do what is no launch of a program, such as a copy, once for all strips."""
     strip = STRIP.get()
     if strip is None or strip.alone():
-        work()
+        with LAUNCHES:
+            work()
 
 
 def repeat_while(going: wp.array, body: Callable[[], None]) -> None:

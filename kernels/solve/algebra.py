@@ -1,4 +1,4 @@
-"""Vector algebra on fields."""
+"""Vector algebra on fields, entry by entry."""
 
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
@@ -6,7 +6,7 @@ from wfluid.kernels.cell.real import Field, Uniform
 
 
 @cells
-def copied(
+def copy(
     i: int,
     j: int,
     k: int,
@@ -14,67 +14,39 @@ def copied(
     # outputs
     out: Field,
 ):
-    """Out = f: the component that forces are then added to."""
+    """out = f."""
     k = inside(k)
     out[k] = f[k]
 
 
 @cells
-def lower(
-    i: int,
-    j: int,
-    k: int,
-    by: Uniform,
-    # outputs
-    b: Field,
-):
-    """Take a number off b, in place: a mean that should not be there."""
-    k = inside(k)
-    b[k] = b[k] - by
-
-
-@cells
-def weigh(
-    i: int,
-    j: int,
-    k: int,
-    weight: Field,
-    # outputs
-    s: Field,
-):
-    """Multiply the divergence at centre k by a weight, in place."""
-    k = inside(k)
-    s[k] = s[k] * weight[k]
-
-
-@cells
-def dragged(
+def scale(
     i: int,
     j: int,
     k: int,
     f: Field,
-    beta: Field,
+    factor: Uniform,
     # outputs
     out: Field,
 ):
-    """Out = beta f: a component of the velocity after drag alone."""
+    """out = factor f."""
     k = inside(k)
-    out[k] = beta[k] * f[k]
+    out[k] = factor * f[k]
 
 
 @cells
-def scaled(
+def multiply(
     i: int,
     j: int,
     k: int,
-    b: Field,
-    rate: Uniform,
+    f: Field,
+    g: Field,
     # outputs
     out: Field,
 ):
-    """The sweep from zero: out = rate b."""
+    """out = g f, which may be f itself."""
     k = inside(k)
-    out[k] = rate * b[k]
+    out[k] = g[k] * f[k]
 
 
 @cells
@@ -82,12 +54,54 @@ def add_scaled(
     i: int,
     j: int,
     k: int,
-    x: Field,
-    e: Field,
+    f: Field,
+    g: Field,
     factor: Uniform,
     # outputs
     out: Field,
 ):
-    """Out = x + factor e: a cycle's correction, with its Chebyshev factor."""
+    """out = f + factor g."""
     k = inside(k)
-    out[k] = x[k] + factor * e[k]
+    out[k] = f[k] + factor * g[k]
+
+
+@cells
+def add(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    # outputs
+    out: Field,
+):
+    """out = out + f, in place."""
+    k = inside(k)
+    out[k] = out[k] + f[k]
+
+
+@cells
+def subtract(
+    i: int,
+    j: int,
+    k: int,
+    f: Field,
+    # outputs
+    out: Field,
+):
+    """out = out - f, in place."""
+    k = inside(k)
+    out[k] = out[k] - f[k]
+
+
+@cells
+def subtract_number(
+    i: int,
+    j: int,
+    k: int,
+    number: Uniform,
+    # outputs
+    out: Field,
+):
+    """out = out - number, in place: takes off a mean that should not be there."""
+    k = inside(k)
+    out[k] = out[k] - number

@@ -8,6 +8,7 @@ Amer. Statist. 33, 1979).
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.program import lines
 from wfluid.kernels.cell.real import Field, Real
 
@@ -16,7 +17,7 @@ from wfluid.kernels.cell.real import Field, Real
 def place(n: int, nx: int, pitch: int):
     """Index in a field of unknown n, counted row by row."""
     row = n // nx
-    return (row + 2) * pitch + 2 + n - row * nx
+    return index(n - row * nx, row, pitch)
 
 
 @lines
@@ -28,7 +29,7 @@ def unit(
     # outputs
     x: Field,
 ):
-    """X = 1 in unknown `which`, 0 elsewhere; `which` may be none of this field's."""
+    """x = 1 in unknown `which`, 0 elsewhere; `which` may be none of this field's."""
     one = Real(0.0)
     if t == which:
         one = Real(1.0)

@@ -7,8 +7,10 @@ Both are A x = b with, in cell or face k,
     diffusion   (1 - dt mu Lap) v = v*   ax = dt mu / hx^2, ay = dt mu / hy^2, centre = 1 + 2 ax + 2 ay
     pressure    -div grad q = -div v     ax = 1 / hx^2,     ay = 1 / hy^2,     centre =     2 ax + 2 ay
 
-second order in space; walls are in the ghosts of x. With face coefficients the pressure operator is
--div (beta grad q), beta on x-faces and y-faces, the centre their weighted sum.
+second order in space; walls are in the ghosts of x. That is `laplacian_c` of `step/differences` with its
+diagonal taken out, `neighbours` - 2 (ax + ay) x: sweeps divide by it, and no term is added to be taken off.
+With face coefficients the pressure operator is -D beta G, beta on x-faces and y-faces, the centre their
+weighted sum.
 
 A damped Jacobi sweep is x + w (b - A x) / centre. Two sweeps whose damping factors are the inverse
 Chebyshev roots of the spectrum they should remove beat two equal ones at the same cost (Golub & Van
@@ -19,11 +21,12 @@ import warp as wp
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
+from wfluid.kernels.step.differences import laplacian_beta_c
 
 
 @wp.func
 def neighbours(x: Field, k: int, pitch: int, ax: Real, ay: Real):
-    """Ax (x_west + x_east) + ay (x_north + x_south)."""
+    """ax (x_west + x_east) + ay (x_north + x_south)."""
     north = inside(k - pitch)
     south = inside(k + pitch)
     return ax * (x[k - 1] + x[k + 1]) + ay * (x[north] + x[south])
@@ -92,18 +95,8 @@ def residual(
 
 
 @wp.func
-def outflow(x: Field, beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
-    """-div (beta grad x): what flows out of cell k through its four faces."""
-    north = inside(k - pitch)
-    south = inside(k + pitch)
-    west_east = beta_x[k] * (x[k] - x[k - 1]) + beta_x[k + 1] * (x[k] - x[k + 1])
-    north_south = beta_y[k] * (x[k] - x[north]) + beta_y[south] * (x[k] - x[south])
-    return ax * west_east + ay * north_south
-
-
-@wp.func
-def outflow_centre(beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
-    """The diagonal of `outflow`."""
+def diagonal_c(beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
+    """The diagonal of -D beta G."""
     south = inside(k + pitch)
     return ax * (beta_x[k] + beta_x[k + 1]) + ay * (beta_y[k] + beta_y[south])
 
@@ -124,10 +117,10 @@ def jacobi_beta(
     # outputs
     out: Field,
 ):
-    """One damped sweep of -div (beta grad x) = b."""
+    """One damped sweep of -D beta G x = b."""
     k = inside(k)
-    left = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)
-    out[k] = x[k] + damping * left / outflow_centre(beta_x, beta_y, k, pitch, ax, ay)
+    left = b[k] + laplacian_beta_c(x, beta_x, beta_y, k, pitch, ax, ay)
+    out[k] = x[k] + damping * left / diagonal_c(beta_x, beta_y, k, pitch, ax, ay)
 
 
 @cells
@@ -147,7 +140,7 @@ def first_sweep_beta(
 ):
     """The sweep from zero: out = damping b / centre."""
     k = inside(k)
-    out[k] = damping * b[k] / outflow_centre(beta_x, beta_y, k, pitch, ax, ay)
+    out[k] = damping * b[k] / diagonal_c(beta_x, beta_y, k, pitch, ax, ay)
 
 
 @cells
@@ -165,6 +158,6 @@ def residual_beta(
     # outputs
     r: Field,
 ):
-    """r = b + div (beta grad x)."""
+    """What is left: r = b + D beta G x."""
     k = inside(k)
-    r[k] = b[k] - outflow(x, beta_x, beta_y, k, pitch, ax, ay)
+    r[k] = b[k] + laplacian_beta_c(x, beta_x, beta_y, k, pitch, ax, ay)

@@ -30,7 +30,7 @@ def begin(
     going: Indices,
     iterations: Indices,
 ):
-    """Rz of the first residual, and where to stop: at tolerance^2 times the lesser of it and <w, w>."""
+    """rz of the first residual, and where to stop: at tolerance^2 times the lesser of it and <w, w>."""
     first = total_of(residual_rows, count)
     rz[0] = first
     limit[0] = tolerance * tolerance * wp.min(first, total_of(whole_rows, count))
@@ -47,7 +47,7 @@ def measure_length(
     # outputs
     length: Field,
 ):
-    """Length = -rz / <p, q>, 0 where p has come to nothing."""
+    """length = -rz / <p, q>, 0 where p has come to nothing."""
     curvature = -total_of(rows, count)
     length[0] = Real(0.0)
     if curvature > Real(0.0):
@@ -67,7 +67,7 @@ def measure_ratio(
     going: Indices,
     iterations: Indices,
 ):
-    """Ratio = rz' / rz; whether to go on. Stops where rounding leaves no descent."""
+    """ratio = rz' / rz; whether to go on. Stops where rounding leaves no descent."""
     left = total_of(rows, count)
     ratio[0] = left / rz[0]
     rz[0] = left
@@ -87,7 +87,7 @@ def advance(
     x: Field,
     r: Field,
 ):
-    """X += length p and r += length q, in place."""
+    """x += length p and r += length q, in place."""
     k = inside(k)
     x[k] = x[k] + length * p[k]
     r[k] = r[k] + length * q[k]
@@ -103,6 +103,6 @@ def turn(
     # outputs
     p: Field,
 ):
-    """P = z + ratio p, in place."""
+    """p = z + ratio p, in place."""
     k = inside(k)
     p[k] = z[k] + ratio * p[k]

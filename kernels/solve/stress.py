@@ -46,7 +46,7 @@ def at_node(c: Field, k: int, along: int, across: int):
 def stress_divergence(
     f: Field, g: Field, mu: Field, k: int, along: int, across: int, normal: Real, shear: Real, cross: Real
 ):
-    """Dt div (mu (grad v + grad v^T)) on face k.
+    """dt div (mu (grad v + grad v^T)) on face k.
 
     normal = 2 dt / h_s^2, shear = dt / h_o^2, cross = dt / (h_s h_o).
     """
@@ -174,6 +174,6 @@ def drag_factor(
     # outputs
     beta: Field,
 ):
-    """Beta = 1 / (1 + dt alpha) on face k: what drag alone leaves of a velocity."""
+    """beta = 1 / (1 + dt alpha) on face k: what drag alone leaves of a velocity."""
     k = inside(k)
     beta[k] = Real(1.0) / (Real(1.0) + dt * at_face(alpha, k, along))

@@ -104,7 +104,7 @@ def prolong_y_add(
     # outputs
     out: Field,
 ):
-    """Out = x + e interpolated between `row` and the next: the coarse grid's correction. One pitch."""
+    """out = x + e interpolated between `row` and the next: the coarse grid's correction. One pitch."""
     k = inside(k)
     a = inside(k + (row - 2 - j) * pitch)
     b = inside(k + (row - 1 - j) * pitch)

@@ -16,6 +16,7 @@ Fluids, 1999, section 3.2; R. Bridson, Fluid Simulation for Computer Graphics, 2
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
@@ -82,8 +83,8 @@ def trace_midpoint(
     row, ty = locate(j, y, ny, periodic_y)
     face_column, face_tx = locate(i, x + half, nx, periodic_x)
     face_row, face_ty = locate(j, y + half, ny, periodic_y)
-    u_middle = bilinear(u, (row + 2) * pitch + face_column + 2, pitch, face_tx, ty)
-    v_middle = bilinear(v, (face_row + 2) * pitch + column + 2, pitch, tx, face_ty)
+    u_middle = bilinear(u, index(face_column, row, pitch), pitch, face_tx, ty)
+    v_middle = bilinear(v, index(column, face_row, pitch), pitch, tx, face_ty)
     foot_x[k] = kept_inside(-dt_hx * u_middle, i, nx, periodic_x)
     foot_y[k] = kept_inside(-dt_hy * v_middle, j, ny, periodic_y)
 
@@ -116,7 +117,7 @@ def advect_face_cubic(
     k = inside(k)
     column, tx = locate(i, mean(foot_x, k, before), nx, periodic_x)
     row, ty = locate(j, mean(foot_y, k, before), ny, periodic_y)
-    out[k] = cubic(f, (row + 2) * pitch + column + 2, pitch, tx, ty)
+    out[k] = cubic(f, index(column, row, pitch), pitch, tx, ty)
 
 
 @cells
@@ -140,4 +141,4 @@ def advect_face_bilinear(
     k = inside(k)
     column, tx = locate(i, mean(foot_x, k, before), nx, periodic_x)
     row, ty = locate(j, mean(foot_y, k, before), ny, periodic_y)
-    out[k] = bilinear(f, (row + 2) * pitch + column + 2, pitch, tx, ty)
+    out[k] = bilinear(f, index(column, row, pitch), pitch, tx, ty)

@@ -17,6 +17,7 @@ vector. A weight is a factor at centres, of which a face takes the mean of its t
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, RowReal, Uniform
@@ -58,7 +59,7 @@ def profile(
 @wp.func
 def in_profile(n: int, i: int, pitch: int):
     """Index of point i of force n in a table of profiles."""
-    return entry((n + 2) * pitch + i + 2)
+    return entry(index(i, n, pitch))
 
 
 @cells

@@ -1,7 +1,7 @@
 """Pressure projection: the part of v that is divergence-free, v - grad q with Lap q = div v.
 
 On the staggered grid the divergence D lives at centres, the gradient G = -D^T on faces, and the
-Laplacian solved (`relaxation`) is exactly D G: what the solver leaves of D G q = D v is what is left
+Laplacian solved (`solve/five_point`) is exactly D G: what the solver leaves of D G q = D v is what is left
 of the divergence. With face coefficients beta the velocity becomes v - beta grad q and the operator
 D beta G. A pressure known from the step before may be taken off first (`subtract_slope`): what is left to
 project is then small, and so is the strain that projecting puts back where viscosity had taken it out
@@ -13,6 +13,7 @@ Bridson, 2nd ed., chapter 5.
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Uniform
+from wfluid.kernels.step.differences import divergence_c, gradient_x, gradient_y, slope
 
 
 @cells
@@ -28,10 +29,9 @@ def minus_divergence(
     # outputs
     b: Field,
 ):
-    """B = -div v [1/s] at centre k: the right-hand side of the positive system -D G q = -D v."""
+    """b = -div v [1/s] at centre k: the right-hand side of the positive system -D G q = -D v."""
     k = inside(k)
-    south = inside(k + pitch)
-    b[k] = inverse_hx * (u[k] - u[k + 1]) + inverse_hy * (v[k] - v[south])
+    b[k] = -divergence_c(u, v, k, pitch, inverse_hx, inverse_hy)
 
 
 @cells
@@ -46,9 +46,12 @@ def subtract_slope(
     # outputs
     out: Field,
 ):
-    """f - kept dq/ds on the face between centres k - `before` and k, one component of v - kept grad q."""
+    """f - kept dq/ds on the face between centres k - `before` and k: one component of v - kept G q.
+
+    kept_h = kept / h; `before` = 1 on x-faces, `pitch` on y-faces.
+    """
     k = inside(k)
-    out[k] = f[k] - kept_h * (q[k] - q[inside(k - before)])
+    out[k] = f[k] - slope(q, k, before, kept_h)
 
 
 @cells
@@ -66,11 +69,10 @@ def subtract_gradient(
     out_u: Field,
     out_v: Field,
 ):
-    """V - grad q on the x-face and the y-face of cell k."""
+    """v - G q on the x-face and the y-face of cell k."""
     k = inside(k)
-    north = inside(k - pitch)
-    out_u[k] = u[k] - inverse_hx * (q[k] - q[k - 1])
-    out_v[k] = v[k] - inverse_hy * (q[k] - q[north])
+    out_u[k] = u[k] - gradient_x(q, k, inverse_hx)
+    out_v[k] = v[k] - gradient_y(q, k, pitch, inverse_hy)
 
 
 @cells
@@ -90,8 +92,7 @@ def subtract_gradient_beta(
     out_u: Field,
     out_v: Field,
 ):
-    """V - beta grad q on the x-face and the y-face of cell k."""
+    """v - beta G q on the x-face and the y-face of cell k."""
     k = inside(k)
-    north = inside(k - pitch)
-    out_u[k] = u[k] - beta_x[k] * inverse_hx * (q[k] - q[k - 1])
-    out_v[k] = v[k] - beta_y[k] * inverse_hy * (q[k] - q[north])
+    out_u[k] = u[k] - gradient_x(q, k, beta_x[k] * inverse_hx)
+    out_v[k] = v[k] - gradient_y(q, k, pitch, beta_y[k] * inverse_hy)

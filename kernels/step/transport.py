@@ -14,6 +14,7 @@ picture are carried forward, dx/dt = v(x), by the midpoint rule.
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import gather, inside
 from wfluid.kernels.cell.program import cells, lines
 from wfluid.kernels.cell.real import Field, Real, Uniform
@@ -42,7 +43,7 @@ def carry_map_cubic(
     k = inside(k)
     column, tx = locate(i, foot_x[k], nx, periodic_x)
     row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = (row + 2) * pitch + column + 2
+    at = index(column, row, pitch)
     out_x[k] = cubic(d_x, at, pitch, tx, ty) + foot_x[k]
     out_y[k] = cubic(d_y, at, pitch, tx, ty) + foot_y[k]
 
@@ -69,7 +70,7 @@ def carry_map_bilinear(
     k = inside(k)
     column, tx = locate(i, foot_x[k], nx, periodic_x)
     row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = (row + 2) * pitch + column + 2
+    at = index(column, row, pitch)
     out_x[k] = bilinear(d_x, at, pitch, tx, ty) + foot_x[k]
     out_y[k] = bilinear(d_y, at, pitch, tx, ty) + foot_y[k]
 
@@ -94,7 +95,7 @@ def carried_along(
     k = inside(k)
     column, tx = locate(i, d_x[k], nx, periodic_x)
     row, ty = locate(j, d_y[k], ny, periodic_y)
-    out[k] = bilinear(f, (row + 2) * pitch + column + 2, pitch, tx, ty)
+    out[k] = bilinear(f, index(column, row, pitch), pitch, tx, ty)
 
 
 @cells
@@ -117,7 +118,7 @@ def carry_density(
     k = inside(k)
     column, tx = locate(i, foot_x[k], nx, periodic_x)
     row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = (row + 2) * pitch + column + 2
+    at = index(column, row, pitch)
     a = gather(rho, at)
     b = gather(rho, at + 1)
     c = gather(rho, at + pitch)
@@ -137,8 +138,8 @@ def velocity_at(
     row, ty = locate(0, y - half, ny, periodic_y)
     column, tx = locate(0, x - half, nx, periodic_x)
     face_row, face_ty = locate(0, y, ny, periodic_y)
-    along_x = cubic(u, (row + 2) * pitch + face_column + 2, pitch, face_tx, ty)
-    along_y = cubic(v, (face_row + 2) * pitch + column + 2, pitch, tx, face_ty)
+    along_x = cubic(u, index(face_column, row, pitch), pitch, face_tx, ty)
+    along_y = cubic(v, index(column, face_row, pitch), pitch, tx, face_ty)
     return along_x, along_y
 
 

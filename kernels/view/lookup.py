@@ -7,12 +7,13 @@ pixel, row by row without padding: four channels are read, weighted and added at
 """
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Indices, Real, RowIndex, RowReal
-from wfluid.kernels.step.interpolation import inner_weight, outer_weight
+from wfluid.kernels.step.interpolation import Four, cubic_weights
 
-Pixel = wp.types.vector(4, Real)
+Pixel = Four
 Pixels = wp.array[Pixel]
 
 CLAMP = wp.constant(0)
@@ -67,7 +68,7 @@ def stretch_x(
     """Source coordinate [px] of pixel (i, j): origin + step_x i + step_y j + slope d."""
     k = inside(k)
     i = entry(i)
-    at = (j + 2) * pitch + 2 + column[i]
+    at = index(column[i], j, pitch)
     west = gather(weight_1, i) * gather(d, at) + gather(weight_2, i) * gather(d, at + 1)
     east = gather(weight_3, i) * gather(d, at + 2) + gather(weight_4, i) * gather(d, at + 3)
     out[k] = origin + step_x * Real(i) + step_y * Real(j) + slope * (west + east)
@@ -75,7 +76,7 @@ def stretch_x(
 
 @wp.func
 def modulo(i: int, n: int):
-    """I mod n in 0 … n - 1, for negative i too."""
+    """i mod n in 0 … n - 1, for negative i too."""
     m = i % n
     return wp.where(m < 0, m + n, m)
 
@@ -218,8 +219,8 @@ def cubic_at_edges(
     picture: Pixels, x: int, y: int, tx: Real, ty: Real, width: int, height: int, edge_x: int, edge_y: int
 ):
     """The same over pixels some of which lie beyond the picture's edges; (x, y) is the first."""
-    wx = Pixel(outer_weight(tx), inner_weight(tx), inner_weight(Real(1.0) - tx), outer_weight(Real(1.0) - tx))
-    wy = Pixel(outer_weight(ty), inner_weight(ty), inner_weight(Real(1.0) - ty), outer_weight(Real(1.0) - ty))
+    wx = cubic_weights(tx)
+    wy = cubic_weights(ty)
     value = Pixel()
     for m in range(4):
         line = wx[0] * pixel(picture, x, y + m, width, height, edge_x, edge_y)
@@ -260,7 +261,7 @@ PI = wp.constant(Real(3.14159265358979323846))
 
 @wp.func
 def lanczos_weight(x: Real):
-    """Sinc(x) sinc(x / 3) for |x| < 3 (Lanczos, three lobes)."""
+    """sinc(x) sinc(x / 3) for |x| < 3 (Lanczos, three lobes)."""
     weight = Real(1.0)
     if wp.abs(x) > Real(1.0e-4):
         angle = PI * x

@@ -1,6 +1,7 @@
 """What a frame is judged by: sums and extremes, one row a line; the host combines the rows."""
 
 import warp as wp
+from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.program import lines
 from wfluid.kernels.cell.real import Field, Real
 
@@ -27,7 +28,7 @@ def row_map_extremes(
     greatest = Real(-1.0e30)
     count = Real(0.0)
     half = Real(0.5)
-    row = (t + 2) * pitch + 2
+    row = index(0, t, pitch)
     for i in range(nx):
         k = row + i
         xx = Real(1.0) + half * (d_x[k + 1] - d_x[k - 1])

@@ -14,7 +14,6 @@ from timing import alternate
 from wfluid.domain.grid import Grid
 from wfluid.fields.arrays import from_numpy, vector
 from wfluid.fields.device import open_device
-from wfluid.fields.sums import norm
 from wfluid.model.fluid import Fluid
 from wfluid.model.painted import Freeze
 from wfluid.solve.system import SolveMethod
@@ -77,7 +76,8 @@ def errors(diffusion, velocity):
         rows = [-np.sum(f.numpy().astype(float) * g.numpy()) for f, g in zip(x, back, strict=True)]
         return np.sqrt(sum(rows))
 
-    figures = energy(left) / energy(exact), norm(left, diffusion.layout) / norm(velocity, diffusion.layout)
+    size = diffusion.system.inner.norm
+    figures = energy(left) / energy(exact), size(left) / size(velocity)
     diffusion.how = how
     diffusion.diffuse(velocity)
     return figures

@@ -55,7 +55,7 @@ def coupled(grid, mu, alpha, walls, device, dt=DT, **settings):
     diffusion = CoupledDiffusion(fluid, medium, device)
     medium.set_time(0.0, dt)
     diffusion.plan(dt)
-    medium.spread()
+    medium.coarsen()
     diffusion.prepare()
     return diffusion
 

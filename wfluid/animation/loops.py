@@ -22,6 +22,7 @@ import numpy as np
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.envelopes import Envelope, Instantaneous, Oscillator, Product, product
+from wfluid.domain.piecewise import ease
 from wfluid.domain.timeline import LOOPS
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import Growth
@@ -165,7 +166,7 @@ def _oscillating(
         terms = zip(weights, (snapshot, first, second, last, after), strict=True)
         closed = Snapshot.sum_of(*terms)
         s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
-        fade = s * s * (3 - 2 * s)  # densities do not swing: towards the end they flow into their beginning
+        fade = ease(s)  # densities do not swing: towards the end they flow into their beginning
         poured = Snapshot.sum_of((1 - fade, snapshot), (fade, first))
         yield SimulatedFrame(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
 
@@ -200,7 +201,6 @@ def _fading(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) -
         if fading <= n < frames:
             yield moment
         elif n >= frames:
-            s = (n - frames) / fading
-            weight = s * s * (3 - 2 * s)
+            weight = ease((n - frames) / fading)
             mixed = Snapshot.sum_of((1 - weight, Snapshot.of(moment.state)), (weight, kept[n - frames]))
             yield SimulatedFrame(mixed.onto(runner.spare), moment.solve)

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
 from wfluid.domain.timeline import Timeline
+from wfluid.fields.arrays import copy
 from wfluid.fields.state import State
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
@@ -69,10 +69,9 @@ class Simulation:
 
     def untouch(self) -> None:
         """Let the picture, densities and points be as at rest; the flow goes on."""
-        rest, now = self.solver.rest(self._points), self.now
-        pairs = [(now.d_x, rest.d_x), (now.d_y, rest.d_y), (now.p_x, rest.p_x), (now.p_y, rest.p_y)]
-        for array, values in [*pairs, *zip(now.rho, rest.rho, strict=True)]:
-            wp.copy(array, values)
+        rest = self.solver.rest(self._points)
+        for untouched, array in zip(rest.seen, self.now.seen, strict=True):
+            copy(untouched, array)
 
 
 def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:

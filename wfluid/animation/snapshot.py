@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wfluid.fields.arrays import assign, read
 from wfluid.fields.state import State
 
 
@@ -21,7 +22,7 @@ class Snapshot:
     @classmethod
     def of(cls, state: State) -> Snapshot:
         """A copy of what a state shows."""
-        return cls(*(tuple(array.numpy().copy() for array in arrays) for arrays in _seen(state)))
+        return cls(*(tuple(read(array).copy() for array in arrays) for arrays in _seen(state)))
 
     @classmethod
     def sum_of(cls, *terms: tuple[float, Snapshot]) -> Snapshot:
@@ -39,7 +40,7 @@ class Snapshot:
         """Write it over what a state shows; returns the state."""
         for values, arrays in zip((self.moved, self.poured), _seen(state), strict=True):
             for value, array in zip(values, arrays, strict=True):
-                array.assign(value)
+                assign(value, array)
         return state
 
 

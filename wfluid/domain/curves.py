@@ -9,6 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from wfluid.domain.piecewise import ease
+
 LINEAR, EASE = "linear", "ease"
 
 CURVES = (LINEAR, EASE)
@@ -43,12 +45,12 @@ class Curve:
     def at(self, part: float | np.ndarray) -> np.ndarray:
         """Its value after parts of the time, of their shape."""
         times, values = (np.array(column, dtype=np.float64) for column in zip(*self.keys, strict=True))
-        part = np.clip(part, 0.0, 1.0)
         if not self.eased:
             return np.interp(part, times, values)
-        after = np.clip(np.searchsorted(times, part, side="right"), 1, len(times) - 1)
-        s = (part - times[after - 1]) / (times[after] - times[after - 1])
-        return values[after - 1] + (values[after] - values[after - 1]) * s * s * (3 - 2 * s)
+        numbers = np.arange(len(times))
+        at = np.interp(part, times, numbers)  # the key before, and the part of the way to the next
+        before = np.floor(at)
+        return np.interp(before + ease(at - before), numbers, values)
 
 
 def curve_of(what: str | Curve | Mapping[float, float], duration: float) -> Curve:

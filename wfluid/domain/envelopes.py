@@ -9,14 +9,13 @@ from __future__ import annotations
 import itertools
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
-from wfluid.domain.piecewise import finite, hats, smoothstep
+from wfluid.domain.piecewise import ease, finite, hats, lerp_at
 
 Slopes = dict[str, np.ndarray]
 """Derivatives by numbers: each under its number's attribute path, "factors[0].period", and in its shape."""
@@ -188,8 +187,8 @@ class Fade(Envelope):
         """The factor, 0 … 1."""
         if not self.start <= t < self.end:
             return 0.0
-        up = smoothstep((t - self.start) / self.rise) if self.rise else 1.0
-        down = smoothstep((self.end - t) / self.fall) if self.fall else 1.0
+        up = ease(min((t - self.start) / self.rise, 1.0)) if self.rise else 1.0
+        down = ease(min((self.end - t) / self.fall, 1.0)) if self.fall else 1.0
         return up * down
 
     def breaks(self) -> tuple[float, ...]:
@@ -228,9 +227,7 @@ class Arbitrary(Envelope):
             return self.function(t)
         if not self.times[0] <= t <= self.times[-1]:
             return 0.0
-        n = min(bisect_right(self.times, t), len(self.times) - 1)
-        t0, t1, v0, v1 = self.times[n - 1], self.times[n], self.values[n - 1], self.values[n]
-        return v0 + (v1 - v0) * (t - t0) / (t1 - t0)
+        return lerp_at(self.times, self.values, t)
 
     def value_slopes(self, t: float) -> Slopes:
         """How much each sample counts, "values" (n,); the numbers of a function are its own."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wfluid.domain.envelopes import Slopes
-from wfluid.domain.piecewise import finite, hats
+from wfluid.domain.piecewise import finite, hats, interval
 
 Place = tuple[float, float]
 """x and y [longer side]."""
@@ -60,11 +59,8 @@ class Path:
 
     def at(self, t: float) -> Place:
         """The place at time t [s]."""
-        after = bisect_right(self.times, t)
-        if after in (0, len(self.times)):
-            return self.places[max(after - 1, 0)]
-        s = (t - self.times[after - 1]) / (self.times[after] - self.times[after - 1])
-        (x0, y0), (x1, y1) = self.places[after - 1], self.places[after]
+        n, m, s = interval(self.times, t)
+        (x0, y0), (x1, y1) = self.places[n], self.places[m]
         return x0 + s * (x1 - x0), y0 + s * (y1 - y0)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import warp as wp
 
+from wfluid.kernels.cell.lock import exclusive
 from wfluid.kernels.cell.program import FORWARD, module_of
 from wfluid.system.stderr import quiet_stderr
 
@@ -37,6 +38,7 @@ def kernels_are_built(device: wp.Device) -> bool:
     return (Path(wp.config.kernel_cache_dir) / module.get_module_identifier(_threads(device))).is_dir()
 
 
+@exclusive
 def load_kernels(device: wp.Device, module: str = FORWARD) -> float:
     """Load every kernel of a module for `device`, compiling them first if need be; the seconds it took.
 

@@ -6,9 +6,9 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.walls import Rule
+from wfluid.fields.arrays import upload
 from wfluid.kernels.adjoint import ghosts as ghosts_adjoint
 from wfluid.kernels.cell.layout import HALO, Layout
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.step import ghosts
 
 
@@ -38,8 +38,8 @@ class Ghosts:
         for n, rule in zip((layout.nx, layout.ny), rules, strict=True):
             source, sign = ghost_table(n, rule)
             self._tables += [
-                wp.array(source + HALO, dtype=wp.int32, device=device),
-                wp.array(sign, dtype=Real, device=device),
+                upload(source + HALO, device, wp.int32),
+                upload(sign, device),
             ]
 
     def fill(self, f: wp.array) -> None:

@@ -4,32 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from functools import wraps
-from typing import ParamSpec, TypeVar
 
 import warp as wp
 
+from wfluid.fields.arrays import read
+from wfluid.kernels.cell.lock import LAUNCHES
 from wfluid.kernels.cell.program import strips
 from wfluid.kernels.cell.strips import GIVEN_UP, STRIP, Strip
 from wfluid.system.threads import ThreadTeam
-
-LAUNCHES = threading.RLock()
-"""Held by whatever calls Warp but for replays: a capture takes in what any thread allocates or launches."""
-
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
-
-
-def exclusive(method: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Hold `LAUNCHES` while `method` runs."""
-
-    @wraps(method)
-    def held(*arguments: Arguments.args, **settings: Arguments.kwargs) -> Result:
-        with LAUNCHES:
-            return method(*arguments, **settings)
-
-    return held
-
 
 _PATIENCE = 10.0
 """How long an interrupted replay waits for its helpers to end [s]."""
@@ -60,7 +42,7 @@ class CapturedGraph:
 
     def _give_up(self) -> None:
         """Let strips that wait go on to their end, whatever they compute; then forget the meetings."""
-        counter = self._strips[0].counter.numpy()
+        counter = read(self._strips[0].counter)
         counter[GIVEN_UP] = 1
         idle = threading.Barrier(len(self._graphs))  # reached when every helper has done what it had
         for _ in self._graphs[1:]:

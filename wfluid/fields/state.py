@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import field, to_numpy, vector
+from wfluid.fields.arrays import clone, copy, field, fill, finite, read, to_numpy, vector, view, zeros
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
+
+FIELDS = ("u", "v", "d_x", "d_y", "q")
+"""Arrays of a state over the grid, beside its densities."""
+
+PARTICLES = ("p_x", "p_y")
+"""Arrays of a state with an entry a point."""
 
 
 @dataclass(frozen=True)
@@ -41,46 +47,61 @@ class State:
     def at_rest(cls, grid: Grid, device: wp.Device, densities: int = 0, points: int = 0) -> State:
         """A still fluid under an untouched picture, without densities; all points at the origin."""
         layout = Layout(grid.nx, grid.ny)
-        p_x, p_y = (wp.zeros(points, dtype=Real, device=device) for _ in range(2))
-        return cls(
-            grid, *(field(layout, device) for _ in range(5)), vector(layout, device, densities), p_x, p_y
-        )
-
-    @property
-    def arrays(self) -> list[wp.array]:
-        """Every array that has entries."""
-        return [
-            a for a in (self.u, self.v, self.d_x, self.d_y, self.q, *self.rho, self.p_x, self.p_y) if a.size
-        ]
+        fields = {name: field(layout, device) for name in FIELDS}
+        particles = {name: zeros(points, device) for name in PARTICLES}
+        return cls(grid, rho=vector(layout, device, densities), **fields, **particles)
 
     @property
     def fields(self) -> list[wp.array]:
         """Every array over the grid."""
-        return [self.u, self.v, self.d_x, self.d_y, self.q, *self.rho]
+        return [*(getattr(self, name) for name in FIELDS), *self.rho]
 
     @property
     def particles(self) -> list[wp.array]:
         """Where points are along x and y."""
-        return [self.p_x, self.p_y]
+        return [getattr(self, name) for name in PARTICLES]
+
+    @property
+    def arrays(self) -> list[wp.array]:
+        """Every array that has entries."""
+        return [a for a in (*self.fields, *self.particles) if a.size]
+
+    @property
+    def seen(self) -> list[wp.array]:
+        """What is seen of it: the map, the points, the densities."""
+        return [self.d_x, self.d_y, *self.particles, *self.rho]
 
     def view(self) -> State:
         """The same memory in arrays of its own, which may have other gradients."""
-        u, v, d_x, d_y, q, p_x, p_y = (
-            a[:] if a.size else wp.empty_like(a)
-            for a in (self.u, self.v, self.d_x, self.d_y, self.q, self.p_x, self.p_y)
-        )
-        return State(self.grid, u, v, d_x, d_y, q, tuple(rho[:] for rho in self.rho), p_x, p_y)
+        return self._with_each(view)
 
     def copy(self) -> State:
         """The same values in arrays of their own."""
-        u, v, d_x, d_y, q, *rho = (wp.clone(a, requires_grad=False) for a in self.fields)
-        return State(self.grid, u, v, d_x, d_y, q, tuple(rho), wp.clone(self.p_x), wp.clone(self.p_y))
+        return self._with_each(clone)
+
+    def _with_each(self, change: Callable[[wp.array], wp.array]) -> State:
+        """A state whose arrays are made of this one's, each by itself."""
+        arrays = {name: change(getattr(self, name)) for name in (*FIELDS, *PARTICLES)}
+        return State(self.grid, rho=tuple(change(rho) for rho in self.rho), **arrays)
+
+    def copy_into(self, other: State) -> None:
+        """Write its values into another state of the same grid, densities and points."""
+        for a, b in zip(self.arrays, other.arrays, strict=True):
+            copy(a, b)
+
+    def zero_(self) -> None:
+        """Write 0 into every array, in place."""
+        fill(0.0, *self.arrays)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number of it is finite."""
+        return finite(self.arrays)
 
     def take_gradient(self, bar: State) -> None:
         """Let the arrays of `bar` hold the gradients."""
-        own = (self.u, self.v, self.d_x, self.d_y, self.q, *self.rho, self.p_x, self.p_y)
-        theirs = (bar.u, bar.v, bar.d_x, bar.d_y, bar.q, *bar.rho, bar.p_x, bar.p_y)
-        for a, b in zip(own, theirs, strict=True):
+        pairs = zip((*self.fields, *self.particles), (*bar.fields, *bar.particles), strict=True)
+        for a, b in pairs:
             a.grad = b
 
     @property
@@ -107,5 +128,5 @@ class State:
     @property
     def points(self) -> np.ndarray:
         """Where the points are now [longer side]: (points, 2), x and y, a copy."""
-        columns = [p.numpy().astype(np.float64) for p in self.particles]
+        columns = [read(p).astype(np.float64) for p in self.particles]
         return np.stack(columns, axis=1) * (self.grid.hx, self.grid.hy)

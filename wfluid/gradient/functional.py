@@ -243,7 +243,7 @@ class Functional:
         return value * self._scale, pulls
 
     def _refuse(self, step: int, bar: State) -> None:
-        if not all(np.all(np.isfinite(a.numpy())) for a in bar.arrays):
+        if not bar.finite:
             t = self._recording.time_of(step)
             raise FloatingPointError(f"the gradient is not finite from step {step} ({t:.4g} s) backward")
 

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from wfluid.fields.arrays import field, from_numpy
-from wfluid.fields.graph import exclusive
+from wfluid.fields.arrays import field, from_numpy, interior, read, upload, zeros
 from wfluid.fields.state import State
 from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
 from wfluid.kernels.adjoint import misfit
-from wfluid.kernels.cell.layout import HALO, Layout
-from wfluid.kernels.cell.real import Real
+from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.view.lookup import Pixel
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture
@@ -81,7 +79,6 @@ class PictureMisfit(StateObjective):
 class _PictureTerm(DeviceObjective):
     """Half the weighted squares of the pixels shown less those wanted."""
 
-    @exclusive
     def __init__(self, misfit: PictureMisfit, stages: Step, weight: float):
         width, height, grid = misfit.target.width, misfit.target.height, stages.grid
         self.device, self.layout = stages.device, Layout(width, height)
@@ -104,16 +101,15 @@ class _PictureTerm(DeviceObjective):
         from_numpy(
             painted * (weight * grid.width * grid.height / (width * height)), self._weight, self.layout
         )
-        self._shown_bar = wp.zeros(self.layout.size, dtype=Pixel, device=self.device)
-        self._rows = wp.zeros(len(self._targets) * height, dtype=Real, device=self.device)
+        self._shown_bar = zeros(self.layout.size, self.device, Pixel)
+        self._rows = zeros(len(self._targets) * height, self.device)
 
     def _on_frame(self, quad: np.ndarray) -> wp.array:
         """Pixels (height, width, 4) as the look-up lays them out."""
         layout = self.layout
         padded = np.zeros((layout.size, QUAD), dtype=quad.dtype)
-        grid = padded[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch, QUAD)
-        grid[HALO : HALO + layout.ny, HALO : HALO + layout.nx] = quad
-        return wp.array(padded, dtype=Pixel, device=self.device)
+        interior(padded, layout)[:] = quad
+        return upload(padded, self.device, Pixel)
 
     def _show(self, state: State) -> None:
         """The warped picture."""
@@ -132,7 +128,7 @@ class _PictureTerm(DeviceObjective):
 
     def value(self) -> float:
         """Half the sum over rows."""
-        return 0.5 * float(self._rows.numpy().sum(dtype=np.float64))
+        return 0.5 * float(read(self._rows).sum(dtype=np.float64))
 
     def adjoint(self, state: State, bar: State) -> None:
         """The weighted misfit, back through the look-up."""

@@ -20,16 +20,15 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.timeline import Timeline
-from wfluid.fields.arrays import from_numpy, to_numpy
+from wfluid.fields.arrays import assign, copy, fill, finite, from_numpy, to_numpy, zeros
 from wfluid.fields.device import load_kernels
-from wfluid.fields.graph import CapturedGraph, exclusive
+from wfluid.fields.graph import CapturedGraph
 from wfluid.fields.state import State
 from wfluid.gradient.checkpoints import Advance, Restore, Reverse, Schedule, Store, even_segments, least_room
 from wfluid.gradient.state_objectives import DeviceObjective
 from wfluid.gradient.step_tables import StepCounter, StepTable
 from wfluid.gradient.variables import Setup
 from wfluid.kernels.adjoint import misfit
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import STRIP, repeat_while
 from wfluid.step.adjoint import StepAdjoint
 from wfluid.step.forcing import Forcing
@@ -80,7 +79,6 @@ class Recording:
         ValueError: a memory cap too small, with the least that works.
     """
 
-    @exclusive
     def __init__(
         self,
         stages: Step,
@@ -122,7 +120,7 @@ class Recording:
         self._pulls = [StepTable(p, rows + 1) for p in self._before.particles]
         changes = stages.medium and stages.medium.changes
         self._viscosities = StepTable(stages.medium.painted_mu, rows) if changes else None
-        self._squares = wp.zeros(2 * grid.ny if effort else 0, dtype=Real, device=device)
+        self._squares = zeros(2 * grid.ny if effort else 0, device)
         self._square_rows = StepTable(self._squares, rows)
         self._counter, self._pool = StepCounter(device), stages.helpers(alone=True)
         self._preparation: CapturedGraph | None = None
@@ -164,8 +162,8 @@ class Recording:
 
     def _kept(self, state: State) -> list[wp.array]:
         """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
-        pressure = [state.q] if self.stages.medium else []
-        return [state.u, state.v, state.d_x, state.d_y, *state.rho, *pressure, *state.particles]
+        fields = state.fields if self.stages.medium else [f for f in state.fields if f is not state.q]
+        return [*fields, *state.particles]
 
     def _planned(self, memory_mb: float | None) -> Schedule:
         breaks = [step for step, terms in self._terms.items() if terms]
@@ -195,7 +193,6 @@ class Recording:
         """When a step begins [s]."""
         return self.timeline.time_of(self._stretch.first + step)
 
-    @exclusive
     def set(self, setup: Setup) -> None:
         """Take a setup whose fluid and forces differ from the first in numbers only.
 
@@ -315,7 +312,6 @@ class Recording:
         """What the last `forward` found of effort and of the terms."""
         return self._value
 
-    @exclusive
     def end(self) -> State:
         """A copy of the state at the end of the last `forward`."""
         return self._before.copy()
@@ -323,7 +319,7 @@ class Recording:
     @property
     def finite(self) -> bool:
         """Whether the fluid was at the end of the last `forward`; what is not finite spreads, and stays."""
-        return all(np.all(np.isfinite(a.numpy())) for a in self._kept(self._before))
+        return finite(self._kept(self._before))
 
     def _places_at(self, row: int) -> np.ndarray:
         columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
@@ -369,12 +365,10 @@ class Recording:
             self._impulses.source_gradients(numbers, bars),
         )
 
-    @exclusive
     def _clear(self) -> None:
         """Begin with no gradients."""
-        self._adjoint.mu_bar.zero_()
-        for a in self._after_bar.arrays:
-            a.zero_()
+        fill(0.0, self._adjoint.mu_bar)
+        self._after_bar.zero_()
 
     def _reverse(
         self, action: Reverse, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None
@@ -413,18 +407,16 @@ class Recording:
         """The row of a segment's first state."""
         return start if self.schedule.keeps_all else 0
 
-    @exclusive
     def _begin(self) -> None:
         """The state at the beginning: what was given, or at rest but for the velocity."""
         state, stages, grid = self._before, self.stages, self.stages.grid
         for p, column, h in zip(state.particles, self._stretch.points.T, (grid.hx, grid.hy), strict=True):
-            p.assign(column / h)
+            assign(column / h, p)
         if self._stretch.begun:
             for a, b in zip(self._stretch.begun.fields, state.fields, strict=True):
-                wp.copy(b, a)
+                copy(a, b)
             return
-        for a in state.fields:
-            a.zero_()
+        fill(0.0, *state.fields)
         for density, rho in zip(stages.densities, state.rho, strict=True):
             density.begin(rho)
         pairs = zip(self._setup.velocity, (state.u, state.v), stages.velocity_ghosts, strict=True)
@@ -444,7 +436,6 @@ class Recording:
         now = self._kept(self._before)
         self._copy(*((now, stored) if isinstance(action, Store) else (stored, now)))
 
-    @exclusive
     def _put(self, start: int, end: int) -> None:
         """Put the numbers of some steps, and the state they begin with, on the device."""
         base = self._base(start)
@@ -455,11 +446,9 @@ class Recording:
             from_numpy(self.stages.medium.at(self.time_of(step + 1)), row, self.stages.layout)
         self._copy(self._kept(self._before), [table.row(base) for table in self._states])
 
-    @exclusive
     def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:
         for a, b in zip(source, to, strict=True):
-            if a.size:
-                wp.copy(b, a)
+            copy(a, b)
 
 
 def record(tape: wp.Tape, back: Callable[[], None], read: State, written: State) -> None:

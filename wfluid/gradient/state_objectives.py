@@ -11,13 +11,12 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.paths import Place
-from wfluid.fields.arrays import from_numpy, vector
+from wfluid.fields.arrays import fill, from_numpy, read, vector, zeros
 from wfluid.fields.state import State
+from wfluid.fields.sums import InnerProduct
 from wfluid.gradient.objectives import Objective, finite_array, places_of
 from wfluid.kernels.adjoint import misfit
-from wfluid.kernels.adjoint import transport as transport_adjoint
-from wfluid.kernels.cell.real import Real
-from wfluid.kernels.solve import sums
+from wfluid.kernels.solve import algebra
 from wfluid.model.painted import Painted
 from wfluid.step.step import Step
 
@@ -129,32 +128,32 @@ class _FieldMisfit(DeviceObjective):
         for n, (target, square) in enumerate(zip(targets, squares, strict=True)):
             from_numpy(target, self._targets[n], self.layout)
             from_numpy(square * painted, self._weights[n], self.layout)
-        self._rows = wp.zeros(fields * grid.ny, dtype=Real, device=self.device)
+        self._inner = InnerProduct(self.layout, self.device, fields)
 
     def _fields(self, state: State) -> list[wp.array]:
         return [state.rho[name] if isinstance(name, int) else getattr(state, name) for name in self._names]
 
     def measure(self, state: State) -> None:
         """Sums along rows."""
-        layout = self.layout
+        self._misfit(state)
+        self._inner.along_rows(self._left, self._weighted)
+
+    def _misfit(self, state: State) -> None:
+        """What is left of each field, and that times its weight."""
         for n, f in enumerate(self._fields(state)):
             out = [self._left[n], self._weighted[n]]
             inputs = [f, self._targets[n], self._weights[n]]
-            misfit.misfit.launch(layout, self.device, inputs, out)
-            inputs = [*out, layout.nx, layout.pitch, n * layout.ny]
-            sums.row_products.launch(layout.ny, self.device, inputs, [self._rows])
+            misfit.misfit.launch(self.layout, self.device, inputs, out)
 
     def value(self) -> float:
         """Half the sum over rows."""
-        return 0.5 * float(self._rows.numpy().sum(dtype=np.float64))
+        return 0.5 * self._inner.total()
 
     def adjoint(self, state: State, bar: State) -> None:
         """The weighted misfit."""
-        for n, (f, to) in enumerate(zip(self._fields(state), self._fields(bar), strict=True)):
-            out = [self._left[n], self._weighted[n]]
-            inputs = [f, self._targets[n], self._weights[n]]
-            misfit.misfit.launch(self.layout, self.device, inputs, out)
-            transport_adjoint.add.launch(self.layout, self.device, [self._weighted[n]], [to])
+        self._misfit(state)
+        for weighted, to in zip(self._weighted, self._fields(bar), strict=True):
+            algebra.add.launch(self.layout, self.device, [weighted], [to])
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,12 +200,12 @@ class _Program(DeviceObjective):
         self, program: Callable[[State, wp.array], Any], weight: float, particles: slice, device: wp.Device
     ):
         self._program, self._weight, self._particles = program, weight, particles
-        self._value = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
-        self._nothing = wp.zeros(0, dtype=Real, device=device)
+        self._value = zeros(1, device, gradient=True)
+        self._nothing = zeros(0, device)
 
     def measure(self, state: State) -> None:
         """Run the program on a tape of its own."""
-        self._value.zero_()
+        fill(0.0, self._value)
         own = self._particles
         p_x, p_y = (p[own] if own.stop > own.start else self._nothing for p in state.particles)
         self._tape = wp.Tape()
@@ -221,11 +220,10 @@ class _Program(DeviceObjective):
 
     def value(self) -> float:
         """Times the weight."""
-        return self._weight * float(self._value.numpy()[0])
+        return self._weight * float(read(self._value)[0])
 
     def adjoint(self, state: State, bar: State) -> None:
         """Play the tape back: the state's arrays know their gradients."""
-        self._value.grad.fill_(self._weight)
-        for a in self._between:
-            a.grad.zero_()
+        fill(self._weight, self._value.grad)
+        fill(0.0, *(a.grad for a in self._between))
         self._tape.backward()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from wfluid.fields.graph import exclusive
+from wfluid.fields.arrays import assign, fill, read, zeros
 from wfluid.kernels.adjoint import step_table
 
 CHUNK = 1024
@@ -17,13 +17,12 @@ class StepCounter:
 
     def __init__(self, device: wp.Device):
         self.device = device
-        self.step, self.going = (wp.zeros(n, dtype=wp.int32, device=device) for n in (2, 1))
+        self.step, self.going = (zeros(n, device, wp.int32) for n in (2, 1))
 
-    @exclusive
     def set(self, row: int, end: int) -> None:
         """Begin at a row; the loop ends when it is at `end`."""
-        self.step.assign(np.array([row, end], dtype=np.int32))
-        self.going.fill_(int(row != end))
+        assign(np.array([row, end], dtype=np.int32), self.step)
+        fill(int(row != end), self.going)
 
     def count(self, by: int) -> None:
         """Go on by so many rows: launches only."""
@@ -35,13 +34,13 @@ class StepTable:
 
     def __init__(self, like: wp.array, count: int):
         self.size, self.device = like.size, like.device
-        self.array = wp.zeros(self.size * count, dtype=like.dtype, device=like.device)
+        self.array = zeros(self.size * count, like.device, like.dtype)
         self._chunk = 1 if self.device.is_cuda else CHUNK
         self._lines = -(-self.size // self._chunk)
         self._take = step_table.take_indices if like.dtype is wp.int32 else step_table.take
 
     def take(self, counter: StepCounter, out: wp.array, ahead: int = 0) -> None:
-        """Out = the row that is `ahead` of the counter's: launches only."""
+        """out = the row that is `ahead` of the counter's: launches only."""
         inputs = [self.array, counter.step, ahead, self.size, self._chunk]
         self._take.launch(self._lines, self.device, inputs, [out])
 
@@ -51,8 +50,8 @@ class StepTable:
         step_table.give.launch(self._lines, self.device, inputs, [self.array])
 
     def copy(self, f: wp.array, out: wp.array) -> None:
-        """Out = f, both as long as a row: launches only."""
-        step_table.copied.launch(self._lines, self.device, [f, self.size, self._chunk], [out])
+        """out = f, both as long as a row: launches only."""
+        step_table.copy.launch(self._lines, self.device, [f, self.size, self._chunk], [out])
 
     def add_to(self, counter: StepCounter, out: wp.array, ahead: int = 0) -> None:
         """Add the row that is `ahead` of the counter's to `out`: launches only."""
@@ -62,14 +61,13 @@ class StepTable:
         """Row n itself."""
         return self.array if not self.size else self.array[n * self.size : (n + 1) * self.size]
 
-    @exclusive
     def put(self, first: int, values: np.ndarray) -> None:
         """Write rows (count, size), from `first` on."""
         if values.size:
-            self.array[first * self.size : (first + len(values)) * self.size].assign(values.ravel())
+            assign(values.ravel(), self.array[first * self.size : (first + len(values)) * self.size])
 
     def rows(self, first: int, end: int) -> np.ndarray:
         """Rows `first` … `end` - 1 as (end - first, size)."""
         if not self.size or first == end:
             return np.zeros((end - first, self.size))
-        return self.array[first * self.size : end * self.size].numpy().reshape(-1, self.size)
+        return read(self.array[first * self.size : end * self.size]).reshape(-1, self.size)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wfluid.domain.envelopes import Constant, Envelope, Oscillator, product
 from wfluid.domain.grid import Grid
-from wfluid.domain.piecewise import finite
+from wfluid.domain.piecewise import ease, finite
 from wfluid.domain.walls import Walls
 from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
 from wfluid.model.painted import Painted
@@ -119,5 +119,5 @@ def _ramps(length: float, grid: Grid, walls: Walls) -> np.ndarray:
     ):
         at = np.linspace(0.0, size, n + 1)
         s = np.clip(np.minimum(at, size - at) / min(length, size / 2), 0.0, 1.0)
-        factors.append(np.ones(n + 1) if periodic else s * s * (3 - 2 * s))
+        factors.append(np.ones(n + 1) if periodic else ease(s))
     return np.outer(*factors)

@@ -8,7 +8,6 @@ the picture and averaged onto the grid's cells.
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -16,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from wfluid.domain.grid import Grid
+from wfluid.domain.piecewise import interval
 from wfluid.pictures.picture import Picture, intensity, resample
 
 VISCOSITY_LIMIT = 1e3
@@ -97,12 +97,9 @@ class Keyed:
     def at(self, t: float, grid: Grid) -> np.ndarray | float:
         """The value at time t [s]: one number, or (ny, nx)."""
         times = list(self.keys)
-        after = bisect_right(times, t)
-        if after in (0, len(times)):
-            return sample_at(self.keys[times[max(after - 1, 0)]], grid, t)
-        t0, t1 = times[after - 1], times[after]
-        start, end = (sample_at(self.keys[time], grid, t) for time in (t0, t1))
-        return start + (end - start) * ((t - t0) / (t1 - t0))
+        n, m, s = interval(times, t)
+        start, end = (sample_at(self.keys[times[key]], grid, t) for key in (n, m))
+        return start + (end - start) * s if m > n else start
 
 
 Quantity = float | Painted | Keyed | Callable[[float], object]

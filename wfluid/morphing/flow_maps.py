@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.domain.walls import Walls
+from wfluid.fields.arrays import clone, copy
 from wfluid.model.force import Force
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
@@ -74,7 +74,7 @@ def flow_maps(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> Fl
     from_start, to_end = (np.zeros(shape, dtype=np.float32) for _ in range(2))
     velocities = []
     for step in range(timeline.steps):
-        velocities.append([wp.clone(f) for f in (now.u, now.v)])
+        velocities.append([clone(f) for f in (now.u, now.v)])
         t, until = timeline.time_of(step), timeline.time_of(step + 1)
         solver.step(now, spare, forces, t, timeline.dt, until=until)
         now, spare = spare, now
@@ -84,7 +84,7 @@ def flow_maps(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> Fl
     now, spare = solver.rest(), solver.rest()
     for step in reversed(range(timeline.steps)):
         for f, kept in zip((now.u, now.v), velocities.pop(), strict=True):
-            wp.copy(f, kept)
+            copy(kept, f)
         solver.carry(now, spare, -timeline.dt)
         now, spare = spare, now
         to_end[step] = CoordinateMap.of_state(now, walls).displacement

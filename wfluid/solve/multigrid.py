@@ -57,15 +57,15 @@ class Level(ABC):
 
     @abstractmethod
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
-        """Out = b - A x; x with ghosts, out without."""
+        """out = b - A x; x with ghosts, out without."""
 
     @abstractmethod
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = rate M^-1 b, without ghosts: the sweep from zero."""
+        """out = rate M^-1 b, without ghosts: the sweep from zero."""
 
     @abstractmethod
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = x + rate M^-1 (b - A x); x with ghosts, out without."""
+        """out = x + rate M^-1 (b - A x); x with ghosts, out without."""
 
     def fill(self, x: Vector) -> None:
         """Fill the ghosts of x, and zero its faces on walls."""

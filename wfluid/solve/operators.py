@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import warp as wp
 
 from wfluid.domain.walls import Walls
-from wfluid.fields.arrays import Vector, field, vector
+from wfluid.fields.arrays import Scalars, Vector, field, vector
 from wfluid.fields.ghosts import Ghosts
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.solve import algebra, five_point, stress
 from wfluid.solve.chebyshev import chebyshev_factors
@@ -31,19 +29,6 @@ FIVE_POINT_INTERVAL = (0.8, 1.0)
 
 STRESS_INTERVAL = (0.65, 1.0)
 """The same for the coupled equation, where viscosity is smooth: 0.78 constant, 0.72 at a contrast of 50."""
-
-
-class Scalars:
-    """Numbers in device memory by name, so that a captured graph follows them when they change."""
-
-    def __init__(self, device: wp.Device, *names: str):
-        self._names = names
-        self._array = wp.zeros(len(names), dtype=Real, device=device)
-        self.__dict__.update({name: self._array[n : n + 1] for n, name in enumerate(names)})
-
-    def set(self, **values: float) -> None:
-        """Give every number its value."""
-        self._array.assign(np.array([values[name] for name in self._names]))
 
 
 class FivePoint(Level):
@@ -78,17 +63,17 @@ class FivePoint(Level):
         self.centre = centre
 
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
-        """Out = b - A x."""
+        """out = b - A x."""
         c = self.numbers
         inputs = [*b, *x, c.centre, c.ax, c.ay, self.layout.pitch]
         five_point.residual.launch(self.layout, self.device, inputs, out)
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = rate b; the rates hold 1 / centre."""
-        algebra.scaled.launch(self.layout, self.device, [*b, rate], out)
+        """out = rate b; the rates hold 1 / centre."""
+        algebra.scale.launch(self.layout, self.device, [*b, rate], out)
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = x + rate (b - A x)."""
+        """out = x + rate (b - A x)."""
         c = self.numbers
         inputs = [*b, *x, rate, c.centre, c.ax, c.ay, self.layout.pitch]
         five_point.jacobi.launch(self.layout, self.device, inputs, out)
@@ -119,17 +104,17 @@ class VariablePoisson(Level):
         self.numbers.set(ax=ax, ay=ay, first=first, second=second, plain=1.0)
 
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
-        """Out = b - A x."""
+        """out = b - A x."""
         inputs = [*b, *x, *self.medium.beta, self.numbers.ax, self.numbers.ay, self.layout.pitch]
         five_point.residual_beta.launch(self.layout, self.device, inputs, out)
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = rate b / centre."""
+        """out = rate b / centre."""
         inputs = [*b, *self.medium.beta, rate, self.numbers.ax, self.numbers.ay, self.layout.pitch]
         five_point.first_sweep_beta.launch(self.layout, self.device, inputs, out)
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = x + rate (b - A x) / centre."""
+        """out = x + rate (b - A x) / centre."""
         inputs = [*b, *x, *self.medium.beta, rate, self.numbers.ax, self.numbers.ay, self.layout.pitch]
         five_point.jacobi_beta.launch(self.layout, self.device, inputs, out)
 
@@ -180,21 +165,21 @@ class ViscousStress(Level):
         )
 
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
-        """Out = b - A x."""
+        """out = b - A x."""
         with together():
             for own, medium in enumerate(self._axes()):
                 inputs = [b[own], x[own], x[1 - own], *medium]
                 stress.residual.launch(self.layout, self.device, inputs, [out[own]])
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = rate M^-1 b."""
+        """out = rate M^-1 b."""
         with together():
             for own in (0, 1):
                 inputs = [b[own], self.weights[own], rate]
                 stress.first_sweep.launch(self.layout, self.device, inputs, [out[own]])
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
-        """Out = x + rate M^-1 (b - A x)."""
+        """out = x + rate M^-1 (b - A x)."""
         with together():
             for own, medium in enumerate(self._axes()):
                 inputs = [b[own], x[own], x[1 - own], *medium, self.weights[own], rate]

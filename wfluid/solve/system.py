@@ -16,9 +16,8 @@ from itertools import pairwise
 import numpy as np
 import warp as wp
 
-from wfluid.fields.arrays import Vector, vector
-from wfluid.fields.sums import norm
-from wfluid.kernels.cell.real import Real
+from wfluid.fields.arrays import Vector, assign, entries, fill, upload, vector, zeros
+from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.cell.strips import alone, together
 from wfluid.kernels.solve import algebra, dense
 from wfluid.solve.chebyshev import chebyshev_count, chebyshev_factors
@@ -102,10 +101,11 @@ class LinearSystem:
             vector(top.layout, device, components) for _ in range(4)
         )
         self.unknowns = coarsest.nx * coarsest.ny * components
-        self._matrices = [wp.zeros(self.unknowns**2, dtype=Real, device=device) for _ in range(2)]
-        self._dense = wp.zeros(self.unknowns, dtype=Real, device=device)
-        self._factors: dict[int, wp.array] = {}
-        self._rates = wp.zeros(SWEEP_LIMIT, dtype=Real, device=device)
+        self._matrices = [zeros(self.unknowns**2, device) for _ in range(2)]
+        self._dense = zeros(self.unknowns, device)
+        self._factors: dict[int, list[wp.array]] = {}
+        self._rates = zeros(SWEEP_LIMIT, device)
+        self.inner = InnerProduct(top.layout, device, components)
         self._conjugate: ConjugateGradients | None = None
 
     def invert_coarsest(self) -> None:
@@ -117,7 +117,7 @@ class LinearSystem:
         # -1 1^T takes the place of the constant, which a singular operator does not see
         shift = float(np.prod([1 / h for h in level.h])) / cells if self.singular else 0.0
         zero = level.b
-        alone(lambda: [f.zero_() for f in zero])
+        alone(lambda: fill(0.0, *zero))
         for column in range(n):
             for component, f in enumerate(level.x):
                 dense.unit.launch(cells, self.device, [column - component * cells, *where], [f])
@@ -142,7 +142,7 @@ class LinearSystem:
             return None
         factors = chebyshev_factors(low, high, sweeps)
         factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]  # short and long in turn
-        self._rates.assign(np.pad(factors / scale, (0, SWEEP_LIMIT - sweeps)))
+        assign(np.pad(factors / scale, (0, SWEEP_LIMIT - sweeps)), self._rates)
         return SolveMethod("chebyshev", sweeps)
 
     def plan_cycles(self, tolerance: float) -> SolveMethod:
@@ -154,12 +154,12 @@ class LinearSystem:
         cycles = how.iterations
         if how.method == "multigrid" and cycles not in self._factors:
             factors = chebyshev_factors(*self.interval, cycles) if cycles > 1 else np.ones(1)
-            self._factors[cycles] = wp.array(factors, dtype=Real, device=self.device)
+            self._factors[cycles] = entries(upload(factors, self.device))
         if how.method == "conjugate gradients" and self._conjugate is None:
             self._conjugate = ConjugateGradients(self.levels[0], self.zero, self.cycle, self.device)
 
     def solve(self, how: SolveMethod, b: Vector, x: Vector, whole: Vector | None = None) -> None:
-        """X = what `how` makes of b. Fills the ghosts of b and x.
+        """x = what `how` makes of b. Fills the ghosts of b and x.
 
         Conjugate gradients stop when what x misses is `tolerance` of x, and of `whole` where given.
         """
@@ -170,14 +170,14 @@ class LinearSystem:
         elif how.method == "conjugate gradients":
             self._conjugate.solve(b, x, how.tolerance, how.iterations, whole)
         elif how.method == "chebyshev":
-            rates = [self._rates[n : n + 1] for n in range(how.iterations)]
+            rates = entries(self._rates, slice(how.iterations))
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
         else:
             rates = [self.levels[0].plain] * how.iterations
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
 
     def _cycles(self, b: Vector, x: Vector, cycles: int) -> None:
-        """X = `cycles` V-cycles on b, from zero."""
+        """x = `cycles` V-cycles on b, from zero."""
         top = self.levels[0]
         factors = self._factors[cycles]
         at, other = (x, self.spare) if cycles % 2 else (self.spare, x)
@@ -189,14 +189,14 @@ class LinearSystem:
                 top.fill(self.left)
                 left = self.left
             self.cycle(left, self.correction)
-            start, factor = other if cycle else self.zero, factors[cycle : cycle + 1]
+            start, factor = other if cycle else self.zero, factors[cycle]
             with together():
                 for f, e, out in zip(start, self.correction, at, strict=True):
                     algebra.add_scaled.launch(top.layout, self.device, [f, e, factor], [out])
             top.fill(at)
 
     def cycle(self, b: Vector, out: Vector, depth: int = 0) -> None:
-        """Out = one V-cycle on b (with ghosts), from zero; out has ghosts and may be the level's y."""
+        """out = one V-cycle on b (with ghosts), from zero; out has ghosts and may be the level's y."""
         level = self.levels[depth]
         if depth == len(self.levels) - 1:
             self._solve_coarsest(b, out)
@@ -227,5 +227,5 @@ class LinearSystem:
         top.fill(self.left)
         top.fill(b)
         ran = self._conjugate.ran() if how.method == "conjugate gradients" else how.iterations
-        left, right, answer = (norm(f, top.layout) for f in (self.left, b, x))
+        left, right, answer = (self.inner.norm(f) for f in (self.left, b, x))
         return Residual(how.method, ran, left, right, norm_a * answer)

@@ -8,10 +8,9 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.walls import Rule
-from wfluid.fields.arrays import Vector, field
+from wfluid.fields.arrays import Vector, field, upload
 from wfluid.fields.ghosts import ghost_table
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.solve import transfer
 from wfluid.solve.multigrid import Level, Location
@@ -27,7 +26,7 @@ class Transfer:
         self.fine, self.coarse = fine, coarse
 
     def restrict(self, r: Vector, out: Vector) -> None:
-        """Out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
+        """out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
         with together():
             for component, f in zip(self.components, r, strict=True):
                 component.down.along_y(f)
@@ -37,7 +36,7 @@ class Transfer:
         self.coarse.fill(out)
 
     def prolong_add(self, x: Vector, e: Vector, out: Vector) -> None:
-        """Out = x + the interpolated e; e with ghosts."""
+        """out = x + the interpolated e; e with ghosts."""
         with together():
             for component, correction in zip(self.components, e, strict=True):
                 component.along_x(correction)
@@ -67,7 +66,7 @@ class _Interpolation:
         transfer.prolong_x.launch(self.down.strip, self.device, inputs, [self.down.between], rows=rows)
 
     def add_along_y(self, x: wp.array, out: wp.array) -> None:
-        """Out = x + what `along_x` made, interpolated to the fine grid's rows."""
+        """out = x + what `along_x` made, interpolated to the fine grid's rows."""
         inputs = [x, self.down.between, *self.up_y, self.down.strip.pitch]
         transfer.prolong_y_add.launch(self.fine, self.device, inputs, [out])
 
@@ -87,7 +86,7 @@ class WeightedSums:
         transfer.restrict_y.launch(self.strip, self.device, inputs, [self.between])
 
     def along_x(self, out: wp.array) -> None:
-        """Out = the sums over columns of what `along_y` made, without ghosts."""
+        """out = the sums over columns of what `along_y` made, without ghosts."""
         inputs = [self.between, *self._x, self.strip.pitch]
         transfer.restrict_x.launch(self.coarse, self.device, inputs, [out])
 
@@ -117,7 +116,7 @@ class Averaging:
         self._collection = WeightedSums(fine, coarse, x, y, device)
 
     def average(self, f: wp.array, out: wp.array) -> None:
-        """Out = the means of f, without ghosts."""
+        """out = the means of f, without ghosts."""
         self._collection.along_y(f)
         self._collection.along_x(out)
 
@@ -181,8 +180,8 @@ def _tables(collected: list[dict[int, float]], device: wp.Device):
         for slot, (i, weight) in enumerate(terms.items()):
             points[slot, c], weights[slot, c] = i + HALO, weight
     return (
-        *(wp.array(row, dtype=wp.int32, device=device) for row in points),
-        *(wp.array(row, dtype=Real, device=device) for row in weights),
+        *(upload(row, device, wp.int32) for row in points),
+        *(upload(row, device) for row in weights),
     )
 
 
@@ -190,6 +189,6 @@ def _padded(before: np.ndarray, fraction: np.ndarray, device: wp.Device):
     """An axis's interpolation tables, padded to whole spans."""
     room = whole_spans(len(before)) - len(before)
     return (
-        wp.array(np.pad(before, (0, room), constant_values=HALO), dtype=wp.int32, device=device),
-        wp.array(np.pad(fraction, (0, room)), dtype=Real, device=device),
+        upload(np.pad(before, (0, room), constant_values=HALO), device, wp.int32),
+        upload(np.pad(fraction, (0, room)), device),
     )

@@ -14,7 +14,7 @@ from functools import partial
 
 import warp as wp
 
-from wfluid.fields.arrays import Vector, field, vector
+from wfluid.fields.arrays import Scalars, Vector, field, fill, vector, zeros
 from wfluid.fields.device import load_kernels
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
@@ -24,8 +24,8 @@ from wfluid.kernels.adjoint import scatter
 from wfluid.kernels.adjoint import transport as transport_adjoint
 from wfluid.kernels.adjoint import viscosity as viscosity_adjoint
 from wfluid.kernels.cell.program import ADJOINT
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, together
+from wfluid.kernels.solve import algebra
 from wfluid.step.forcing import Forcing
 from wfluid.step.step import Step
 
@@ -49,21 +49,17 @@ class StepAdjoint:
         self._projected_bar, self._carried_bar = (vector(layout, device, 2) for _ in range(2))
         self._own_feet = [vector(layout, device, 2) for _ in range(4)]
         self._foot_bar, self._centre_bar = (vector(layout, device, 2) for _ in range(2))
-        self._places = [
-            (wp.zeros(layout.size, dtype=wp.int32, device=device), *vector(layout, device, 2))
-            for _ in range(3)
-        ]
+        self._places = [(zeros(layout.size, device, wp.int32), *vector(layout, device, 2)) for _ in range(3)]
         paper = stages.fluid.scheme == "paper"
         self._scatter = scatter.scatter_bilinear if paper else scatter.scatter_cubic
         self._foot_adjoint = (
             advection_adjoint.foot_adjoint_bilinear if paper else advection_adjoint.foot_adjoint_cubic
         )
         self._effort_bar = vector(layout, device, 2) if effort else ()
-        numbers = wp.array(
-            [1 / grid.hx, 1 / grid.hy, grid.hx**-2, grid.hy**-2, dt], dtype=Real, device=device
-        )
-        self._inverse_h, self._inverse_h2 = [numbers[0:1], numbers[1:2]], [numbers[2:3], numbers[3:4]]
-        self._dt = numbers[4:5]
+        x, y = 1 / grid.hx, 1 / grid.hy
+        numbers = Scalars(device, x=x, y=y, xx=grid.hx**-2, yy=grid.hy**-2, dt=dt)
+        self._inverse_h, self._inverse_h2 = [numbers.x, numbers.y], [numbers.xx, numbers.yy]
+        self._dt = numbers.dt
 
     mu_bar: wp.array
     """The gradient with respect to viscosity where it is painted, at centres, added to by every step."""
@@ -122,7 +118,7 @@ class StepAdjoint:
         stages, pitch = self.stages, self.layout.pitch
         answer = stages.diffusion.adjoint_answer
         if self._moves:
-            alone(self._mu_bar.zero_)
+            alone(lambda: fill(0.0, self._mu_bar))
         if stages.medium:
             inputs = [*diffused, *answer, self._dt, *self._inverse_h, pitch]
             viscosity_adjoint.take_dissipation.launch(self.layout, self.device, inputs, [self._mu_bar])
@@ -140,7 +136,7 @@ class StepAdjoint:
         fields = (*pushed, state.d_x, state.d_y)
         arrived = (*carried_bar, out_bar.d_x, out_bar.d_y)
         outs = (bar.u, bar.v, bar.d_x, bar.d_y)
-        alone(lambda: [f.zero_() for f in (*outs, *bar.rho)])
+        alone(lambda: fill(0.0, *outs, *bar.rho))
         places = [self._places[n] for n in (0, 1, 2, 2)]
         with together():
             for place, before in zip(self._places, (1, pitch, 0), strict=True):
@@ -185,7 +181,7 @@ class StepAdjoint:
             density.adjoint(out_bar.rho[n], *inputs, bar.rho[n], foot)
             density.fold(bar.rho[n])
             for f, to in zip(foot, self._foot_bar, strict=True):
-                transport_adjoint.add.launch(self.layout, self.device, [f], [to])
+                algebra.add.launch(self.layout, self.device, [f], [to])
 
     def _trace(self, state: State, impulses: Forcing, out_bar: State, bar: State) -> None:
         """Through the feet and the points, which both follow the velocity that the step begins with."""

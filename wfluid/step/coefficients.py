@@ -10,9 +10,8 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import from_numpy, where
+from wfluid.fields.arrays import assign, from_numpy, where, zeros
 from wfluid.fields.state import State
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import stress
 from wfluid.kernels.step import transport
 from wfluid.model.fluid import Fluid
@@ -58,7 +57,7 @@ class Coefficients:
             ]
             for pair in pairs
         ]
-        self._dt = wp.zeros(1, dtype=Real, device=device)
+        self._dt = zeros(1, device)
         self._now: tuple[float, float] | None = None
         top = self.levels[0]
         self._painted = (
@@ -80,7 +79,7 @@ class Coefficients:
         self.mu = self.at(t)
         from_numpy(self.mu, self._painted.mu, self._painted.layout)
         self.fill_painted()
-        self._dt.assign([dt])
+        assign([dt], self._dt)
         self._now = now
         return True
 
@@ -101,7 +100,7 @@ class Coefficients:
             ValueError: as `at`.
         """
         self.invalidate()
-        self._dt.assign([dt])
+        assign([dt], self._dt)
         self.mu = self.at(times[0])
         for t in times[1:]:
             self.mu = np.maximum(self.mu, self.at(t))

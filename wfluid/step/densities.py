@@ -9,12 +9,11 @@ import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Walls
-from wfluid.fields.arrays import Vector, field, from_numpy
+from wfluid.fields.arrays import Vector, entries, field, from_numpy
 from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import transport as transport_adjoint
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
-from wfluid.kernels.solve import sums
 from wfluid.kernels.step import sources, transport
 from wfluid.model.densities import Density, PaintedSource, Source
 from wfluid.model.fluid import Fluid
@@ -35,7 +34,10 @@ class DensitySources:
         self._fields = [field(self.layout, device) for _ in self._painted]
         for n, f in zip(self._painted, self._fields, strict=True):
             from_numpy(density.sources[n].paint.sample(grid), f, self.layout)
-        self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
+        self._inner = InnerProduct(self.layout, device)
+
+        self._impulses: list[wp.array] = []
+        self._impulses_bar: list[wp.array] = []
 
     blobs: GaussianBatch | None
     """The round sources."""
@@ -47,7 +49,7 @@ class DensitySources:
 
     def bind(self, impulses: wp.array, impulses_bar: wp.array) -> None:
         """Where the painted sources' impulses are on the device, and their gradients."""
-        self._impulses, self._impulses_bar = impulses, impulses_bar
+        self._impulses, self._impulses_bar = entries(impulses), entries(impulses_bar)
 
     def impulses(self, density: Density, start: float, end: float) -> list[float]:
         """What the painted sources do from `start` to `end` [s]."""
@@ -63,19 +65,15 @@ class DensitySources:
         """Add what they pour to the density, in place: launches only."""
         if self.blobs:
             self.blobs.pour(rho)
-        for n, f in enumerate(self._fields):
-            inputs = [f, self._impulses[n : n + 1]]
-            sources.pour_field.launch(self.layout, self.device, inputs, [rho])
+        for f, impulse in zip(self._fields, self._impulses, strict=True):
+            sources.pour_field.launch(self.layout, self.device, [f, impulse], [rho])
 
     def adjoint(self, rho_bar: wp.array) -> None:
         """The transpose of `add` with respect to the sources' numbers: launches only."""
         if self.blobs:
             self.blobs.measure_centres(rho_bar)
-        nx, ny, pitch = self.layout.nx, self.layout.ny, self.layout.pitch
-        for n, f in enumerate(self._fields):
-            sums.row_products.launch(ny, self.device, [rho_bar, f, nx, pitch, 0], [self._rows])
-            out = self._impulses_bar[n : n + 1]
-            sums.mean_of.launch(1, self.device, [self._rows, ny, 1], [out])
+        for f, out in zip(self._fields, self._impulses_bar, strict=True):
+            self._inner.dot([rho_bar], [f], out)
 
     def gradients(
         self, numbers: np.ndarray, moments: np.ndarray, impulses_bar: np.ndarray
@@ -124,7 +122,7 @@ class DensityTransport:
         pour: Callable[[wp.array], None],
         out: wp.array,
     ) -> None:
-        """Out = the density a step later, with ghosts; `pour` adds what its sources do: launches only."""
+        """out = the density a step later, with ghosts; `pour` adds what its sources do: launches only."""
         carried = self._carried if self._diffuses() else out
         transport.carry_density.launch(self.layout, self.device, [rho, *foot, *where], [carried])
         pour(carried)

@@ -10,11 +10,10 @@ from __future__ import annotations
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Vector, vector
+from wfluid.fields.arrays import Scalars, Vector, copy, vector
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, together
-from wfluid.kernels.solve import algebra, sums
+from wfluid.kernels.solve import algebra
 from wfluid.model.fluid import Fluid
 from wfluid.solve.multigrid import Location, hierarchy
 from wfluid.solve.operators import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, ViscousStress
@@ -39,16 +38,12 @@ class ScalarDiffusion:
     ):
         self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
         self._conserved = conserved
-        if conserved:
-            self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=device)
-            self._rows = wp.zeros(grid.ny, dtype=Real, device=device)
-            self._mean = wp.zeros(1, dtype=Real, device=device)
         size = (grid.width, grid.height)
         levels = [FivePoint(*n, size, points, device) for n in hierarchy(grid.nx, grid.ny, size)]
         self.system = LinearSystem(levels, device, FIVE_POINT_INTERVAL)
         self.how = SolveMethod("none", 0)
         self._change, self._answer = (vector(self.layout, device, 1) for _ in range(2))
-        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._numbers = Scalars(device, "mean", one=1.0)
         self._dt_mu = -1.0
 
     def plan(self, dt_mu: float) -> SolveMethod:
@@ -73,38 +68,35 @@ class ScalarDiffusion:
         return sweeps or self.system.plan_cycles(tolerance)
 
     def diffuse(self, f: wp.array, out: wp.array) -> None:
-        """Out = f (with ghosts) diffused, with ghosts."""
+        """out = f (with ghosts) diffused, with ghosts."""
         top = self.system.levels[0]
         top.residual((f,), (f,), self._change)
         self.system.solve(self.how, self._change, self._answer)
         if self._conserved and self.how.method == "multigrid":
             self._balance(*self._answer)
-        inputs = [f, *self._answer, self._one]
+        inputs = [f, *self._answer, self._numbers.one]
         algebra.add_scaled.launch(self.layout, self.device, inputs, [out])
         top.fill((out,))
 
     def adjoint(self, out_bar: wp.array, f_bar: wp.array) -> None:
         """The transpose of `diffuse`, without ghosts: f_bar = out_bar + (1 - A) M out_bar."""
         top, b = self.system.levels[0], self._change
-        alone(lambda: wp.copy(b[0], out_bar))
+        alone(lambda: copy(out_bar, *b))
         if self._conserved and self.how.method == "multigrid":
             self._balance(*b)
         self.system.solve(self.how, b, self._answer)
         top.residual(self._answer, self._answer, b)
-        algebra.add_scaled.launch(self.layout, self.device, [out_bar, *b, self._one], [f_bar])
+        algebra.add_scaled.launch(self.layout, self.device, [out_bar, *b, self._numbers.one], [f_bar])
 
     @property
     def adjoint_answer(self) -> wp.array:
-        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        """lambda = M out_bar of the last `adjoint`, with ghosts."""
         return self._answer[0]
 
     def _balance(self, change: wp.array) -> None:
         """Take its mean off a change."""
-        nx, ny, device = self.layout.nx, self.layout.ny, self.device
-        inputs = [change, self._ones, nx, self.layout.pitch, 0]
-        sums.row_products.launch(ny, device, inputs, [self._rows])
-        sums.mean_of.launch(1, device, [self._rows, ny, nx * ny], [self._mean])
-        algebra.lower.launch(self.layout, device, [self._mean], [change])
+        self.system.inner.mean(change, self._numbers.mean)
+        algebra.subtract_number.launch(self.layout, self.device, [self._numbers.mean], [change])
 
     def measure(self) -> Residual:
         """What the last solve left, relative to the change it made."""
@@ -138,7 +130,7 @@ class SeparateDiffusion:
         return self.how
 
     def diffuse(self, velocity: Vector) -> None:
-        """Out = the velocity (with ghosts) diffused, with ghosts."""
+        """out = the velocity (with ghosts) diffused, with ghosts."""
         for component, f, out in zip(self.components, velocity, self.out, strict=True):
             component.diffuse(f, out)
 
@@ -149,7 +141,7 @@ class SeparateDiffusion:
 
     @property
     def adjoint_answer(self) -> Vector:
-        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        """lambda = M out_bar of the last `adjoint`, with ghosts."""
         return tuple(component.adjoint_answer for component in self.components)
 
     def measure(self) -> Residual:
@@ -168,7 +160,7 @@ class CoupledDiffusion:
         self.system = LinearSystem(levels, device, STRESS_INTERVAL)
         self.how = SolveMethod("none", 0)
         self.out, self._start, self._change, self._answer = (vector(self.layout, device, 2) for _ in range(4))
-        self._one = wp.array([1.0], dtype=Real, device=device)
+        self._numbers = Scalars(device, one=1.0)
 
     def plan(self, dt: float) -> SolveMethod:
         """Take the step and the medium's bounds; what the solve will be. `prepare` must follow."""
@@ -194,17 +186,17 @@ class CoupledDiffusion:
         self.system.invert_coarsest()
 
     def diffuse(self, velocity: Vector) -> None:
-        """Out = the velocity (with ghosts) diffused, with ghosts."""
+        """out = the velocity (with ghosts) diffused, with ghosts."""
         top = self.system.levels[0]
         with together():
             for f, beta, start in zip(velocity, self.medium.levels[0].beta, self._start, strict=True):
-                algebra.dragged.launch(self.layout, self.device, [f, beta], [start])
+                algebra.multiply.launch(self.layout, self.device, [f, beta], [start])
         top.fill(self._start)
         top.residual(velocity, self._start, self._change)
         self.system.solve(self.how, self._change, self._answer, whole=velocity)
         with together():
             for f, change, out in zip(self._start, self._answer, self.out, strict=True):
-                algebra.add_scaled.launch(self.layout, self.device, [f, change, self._one], [out])
+                algebra.add_scaled.launch(self.layout, self.device, [f, change, self._numbers.one], [out])
         top.fill(self.out)
 
     def adjoint(self, out_bar: Vector, f_bar: Vector) -> None:
@@ -215,14 +207,14 @@ class CoupledDiffusion:
         top.residual(out_bar, answer, self._change)
         with together():
             for change, b, start in zip(self._change, beta, self._start, strict=True):
-                algebra.dragged.launch(self.layout, self.device, [change, b], [start])
+                algebra.multiply.launch(self.layout, self.device, [change, b], [start])
         with together():
             for start, f, to in zip(self._start, answer, f_bar, strict=True):
-                algebra.add_scaled.launch(self.layout, self.device, [start, f, self._one], [to])
+                algebra.add_scaled.launch(self.layout, self.device, [start, f, self._numbers.one], [to])
 
     @property
     def adjoint_answer(self) -> Vector:
-        """Lambda = M out_bar of the last `adjoint`, with ghosts."""
+        """lambda = M out_bar of the last `adjoint`, with ghosts."""
         return self._answer
 
     def measure(self) -> Residual:

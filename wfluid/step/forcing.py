@@ -10,13 +10,13 @@ import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import STEP_LIMIT
-from wfluid.fields.arrays import Vector, field, from_numpy, vector
+from wfluid.fields.arrays import Vector, assign, entries, field, from_numpy, read, vector, zeros
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
+from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import forces as forces_adjoint
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
-from wfluid.kernels.solve import algebra, sums
+from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import forces
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import FORCE_LIMIT, FieldForce, Force, LocalForce
@@ -55,7 +55,7 @@ class Forcing:
         self._pourings = [DensitySources(density, *make) for density in fluid.densities]
         self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
         self._lifted = field(self.layout, device) if self._lifts and gradients else None
-        self._rows = wp.zeros(2 * grid.ny, dtype=Real, device=device)
+        self._inner = InnerProduct(self.layout, device, 2)
         self._lay_out()
 
     prescribed: float = 0.0
@@ -75,14 +75,14 @@ class Forcing:
         painted = sum(pouring.painted for pouring in self._pourings)
         begin = _STEP + impulses + painted
         self.numbers, self.bars = (
-            wp.zeros(size, dtype=Real, device=self.device)
+            zeros(size, self.device)
             for size in (begin + sum(b.numbers for b in blobs), begin + sum(b.moments for b in blobs))
         )
-        self.boxes = wp.zeros(sum(b.boxes for b in blobs), dtype=wp.int32, device=self.device)
-        step = _entries(self.numbers, slice(0, _STEP))
+        self.boxes = zeros(sum(b.boxes for b in blobs), self.device, wp.int32)
+        step = entries(self.numbers, slice(_STEP))
         self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = step
         self._lone = slice(_STEP, _STEP + impulses)
-        self._impulses, self._impulses_bar = (_entries(a, self._lone) for a in (self.numbers, self.bars))
+        self._impulses, self._impulses_bar = (entries(a, self._lone) for a in (self.numbers, self.bars))
         at = self._lone.stop
         self._painted: list[slice] = []
         for pouring in self._pourings:
@@ -120,7 +120,7 @@ class Forcing:
     @property
     def removed(self) -> float:
         """Of the divergence prescribed, what had no place: its mean, taken off everywhere [1/s]."""
-        return float(sum(growths.mean.numpy()[0] for growths in self._growths))
+        return float(sum(read(growths.mean)[0] for growths in self._growths))
 
     def set(
         self,
@@ -134,8 +134,8 @@ class Forcing:
     ) -> None:
         """Put a step on the device: what `row` finds."""
         numbers, boxes = self.row(forces, fluid, t, dt, until, kept, live)
-        self.numbers.assign(numbers)
-        self.boxes.assign(boxes)
+        assign(numbers, self.numbers)
+        assign(boxes, self.boxes)
 
     def row(
         self,
@@ -190,9 +190,9 @@ class Forcing:
         return np.concatenate([numbers, *(row for row, _ in rows)]), np.concatenate(boxes)
 
     def push(self, state: State, out: Vector) -> None:
-        """Out = the state's velocity and the forces' impulses, without ghosts: launches only."""
+        """out = the state's velocity and the forces' impulses, without ghosts: launches only."""
         for f, to in zip((state.u, state.v), out, strict=True):
-            algebra.copied.launch(self.layout, self.device, [f], [to])
+            algebra.copy.launch(self.layout, self.device, [f], [to])
         impulses = iter(self._impulses)
         for (_, fields), impulse in zip(self._fields, impulses, strict=False):
             for f, component in zip(fields, out, strict=True):
@@ -228,25 +228,17 @@ class Forcing:
         """
         bars = iter(self._impulses_bar)
         for _, fields in self._fields:
-            self._multiply(velocity_bar, fields, next(bars))
+            self._inner.dot(velocity_bar, fields, next(bars))
         for density, f_bar, before, impulse in self._lifting(velocity_bar):
             inputs = [state.rho[density], before]
             forces_adjoint.mean_with_before.launch(self.layout, self.device, inputs, [self._lifted])
-            self._multiply([f_bar], [self._lifted], next(bars))
-            algebra.copied.launch(self.layout, self.device, [f_bar], [self._lifted])
+            self._inner.dot([f_bar], [self._lifted], next(bars))
+            algebra.copy.launch(self.layout, self.device, [f_bar], [self._lifted])
             self._velocity_ghosts[before > 1].fill(self._lifted)
             inputs = [self._lifted, impulse, before, self.layout.nx]
             forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho_bar[density]])
         for pushes in self._pushes:
             pushes.adjoint(velocity_bar)
-
-    def _multiply(self, x: Sequence[wp.array], y: Sequence[wp.array], out: wp.array) -> None:
-        """The sum of x y over all points."""
-        nx, ny = self.layout.nx, self.layout.ny
-        for n, (f, g) in enumerate(zip(x, y, strict=True)):
-            inputs = [f, g, nx, self.layout.pitch, n * ny]
-            sums.row_products.launch(ny, self.device, inputs, [self._rows])
-        sums.mean_of.launch(1, self.device, [self._rows, len(x) * ny, 1], [out])
 
     def prescribe_adjoint(self, minus_b_bar: wp.array) -> None:
         """The transpose of `prescribe`, from minus the gradient: launches only."""
@@ -294,11 +286,6 @@ def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
             groups = found[isinstance(force, Growth)]
             groups.setdefault(id(force.weight), (force.weight, []))[1].append(n)
     return list(found[0].values()), list(found[1].values())
-
-
-def _entries(array: wp.array, part: slice) -> list[wp.array]:
-    """Each number of a part of an array, as an array."""
-    return [array[n : n + 1] for n in range(part.start, part.stop)]
 
 
 def _index_of(name: str, densities: Sequence[str]) -> int:

@@ -9,13 +9,14 @@ import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Walls
-from wfluid.fields.arrays import Vector, field, from_numpy, vector
+from wfluid.fields.arrays import Vector, field, fill, from_numpy, vector, zeros
 from wfluid.fields.ghosts import Ghosts
+from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import forces as forces_adjoint
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Indices, Real
+from wfluid.kernels.cell.real import Indices
 from wfluid.kernels.cell.strips import alone
-from wfluid.kernels.solve import algebra, sums
+from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import forces, sources
 from wfluid.model.force import GaussianImpulse
 from wfluid.model.painted import Painted
@@ -47,7 +48,7 @@ class GaussianBatch:
         self._x = _Profiles(count, grid.nx, grid.hx, grid.width * walls.periodic[0], device)
         self._y = _Profiles(count, grid.ny, grid.hy, grid.height * walls.periodic[1], device)
         if gradients:
-            self._sums = wp.zeros(forces_adjoint.ORDERS * count * grid.ny, dtype=Real, device=device)
+            self._sums = zeros(forces_adjoint.ORDERS * count * grid.ny, device)
 
     numbers: int
     """Entries of a row of numbers."""
@@ -250,7 +251,7 @@ class GaussianForces(_Weighted):
             self.blobs.push(velocity)
             return
         gained = self._gained
-        alone(lambda: [f.zero_() for f in gained])
+        alone(lambda: fill(0.0, *gained))
         self.blobs.push(gained)
         for f, component, before in zip(gained, velocity, (1, self.layout.pitch), strict=True):
             inputs = [f, self._weights, before]
@@ -275,35 +276,30 @@ class GrowthSources(_Weighted):
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self._swell = field(self.layout, self.device)
-        self._ones = wp.full(self.layout.size, 1.0, dtype=Real, device=self.device)
-        self._rows = wp.zeros(self.layout.ny, dtype=Real, device=self.device)
-        self.mean = wp.zeros(1, dtype=Real, device=self.device)
+        self._inner, self.mean = InnerProduct(self.layout, self.device), zeros(1, self.device)
 
     mean: wp.array
     """What was taken off [1/s]."""
 
     def add(self, b: wp.array) -> None:
         """Add what they prescribe to b, in place: launches only."""
-        alone(self._swell.zero_)
+        alone(lambda: fill(0.0, self._swell))
         self.blobs.swell(self._swell)
         if self._weights is not None:
-            algebra.weigh.launch(self.layout, self.device, [self._weights], [self._swell])
+            algebra.multiply.launch(self.layout, self.device, [self._swell, self._weights], [self._swell])
         self._add_balanced(self._swell, b)
 
     def _add_balanced(self, s: wp.array, b: wp.array) -> None:
-        nx, ny = self.layout.nx, self.layout.ny
-        inputs = [s, self._ones, nx, self.layout.pitch, 0]
-        sums.row_products.launch(ny, self.device, inputs, [self._rows])
-        sums.mean_of.launch(1, self.device, [self._rows, ny, nx * ny], [self.mean])
+        self._inner.mean(s, self.mean)
         sources.add_balanced.launch(self.layout, self.device, [s, self.mean], [b])
 
     def adjoint(self, minus_b_bar: wp.array) -> None:
         """The transpose of `add`, down to the moments of the Gaussians, all with minus: launches only."""
         minus_s_bar = self._swell
-        alone(minus_s_bar.zero_)
+        alone(lambda: fill(0.0, minus_s_bar))
         self._add_balanced(minus_b_bar, minus_s_bar)
         if self._weights is not None:
-            algebra.weigh.launch(self.layout, self.device, [self._weights], [minus_s_bar])
+            algebra.multiply.launch(self.layout, self.device, [minus_s_bar, self._weights], [minus_s_bar])
         self.blobs.measure_centres(minus_s_bar)
 
     def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:

@@ -7,11 +7,8 @@ from collections.abc import Callable
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Vector, field, vector
-from wfluid.fields.sums import largest
-from wfluid.kernels.adjoint import projection as projection_adjoint
+from wfluid.fields.arrays import Scalars, Vector, field, vector
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import projection
 from wfluid.model.fluid import Fluid
@@ -50,8 +47,8 @@ class Projection:
             self.prepare()
         self.system.prepare(self.how)
         self._q, self._minus_div = ((field(self.layout, device),) for _ in range(2))
-        numbers = wp.array([1 / grid.hx, 1 / grid.hy], dtype=Real, device=device)
-        self._inverse_h = [numbers[0:1], numbers[1:2]]
+        numbers = Scalars(device, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
+        self._inverse_h = [numbers.inverse_hx, numbers.inverse_hy]
         self._resisted = vector(self.layout, device, 2) if medium else ()
 
     def plan(self, dt: float) -> SolveMethod:
@@ -71,7 +68,7 @@ class Projection:
     def project(
         self, velocity: Vector, out: Vector, prescribe: Callable[[wp.array], None] | None = None
     ) -> None:
-        """Out = the velocity (with ghosts) without its divergence; out comes without ghosts.
+        """out = the velocity (with ghosts) without its divergence; out comes without ghosts.
 
         `prescribe` adds a divergence that is to stay to the field it is called with.
         """
@@ -102,12 +99,12 @@ class Projection:
         if beta:
             resisted = self._resisted
             for f, b, to in zip(out_bar, beta, resisted, strict=True):
-                algebra.dragged.launch(self.layout, self.device, [f, b], [to])
+                algebra.multiply.launch(self.layout, self.device, [f, b], [to])
             fill(resisted)
         inputs = [*resisted, *self._inverse_h, pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
         if q_bar is not None:
-            projection_adjoint.take.launch(self.layout, self.device, [q_bar], self._minus_div)
+            algebra.subtract.launch(self.layout, self.device, [q_bar], self._minus_div)
         self.system.solve(self.how, self._minus_div, self._q)
         inputs = [*out_bar, *self._q, *self._inverse_h, pitch]
         projection.subtract_gradient.launch(self.layout, self.device, inputs, velocity_bar)
@@ -120,15 +117,15 @@ class Projection:
     def kept_adjoint(self, velocity_bar: Vector, q_bar: wp.array, kept: wp.array, out: wp.array) -> None:
         """The transpose of taking the part `kept` of the last pressure off and adding it again.
 
-        Out = kept (q_bar + div velocity_bar); `velocity_bar` with ghosts.
+        out = kept (q_bar + div velocity_bar); `velocity_bar` with ghosts. `q_bar` is written over.
         """
         inputs = [*velocity_bar, *self._inverse_h, self.layout.pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
-        inputs = [q_bar, *self._minus_div, kept]
-        projection_adjoint.kept_difference.launch(self.layout, self.device, inputs, [out])
+        algebra.subtract.launch(self.layout, self.device, self._minus_div, [q_bar])
+        algebra.scale.launch(self.layout, self.device, [q_bar, kept], [out])
 
     def add_pressure(self, q: wp.array, kept: wp.array, out: wp.array) -> None:
-        """Out = the impulse of the pressure: the part `kept` of q, taken off before, and the projected."""
+        """out = the impulse of the pressure: the part `kept` of q, taken off before, and the projected."""
         inputs = [*self._q, q, kept]
         algebra.add_scaled.launch(self.layout, self.device, inputs, [out])
         self.system.levels[0].fill((out,))
@@ -136,4 +133,4 @@ class Projection:
     def measure(self) -> tuple[Residual, float]:
         """What the last projection left of the divergence not prescribed: residual, largest value [1/s]."""
         residual = self.system.measure(self.how, self._minus_div, self._q)
-        return residual, largest(self.system.left[0], self.layout)
+        return residual, self.system.inner.largest(self.system.left[0])

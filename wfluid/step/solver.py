@@ -12,9 +12,9 @@ import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import STEP_LIMIT
-from wfluid.fields.arrays import from_numpy
+from wfluid.fields.arrays import assign, copy, fill, from_numpy
 from wfluid.fields.device import load_kernels
-from wfluid.fields.graph import CapturedGraph, exclusive
+from wfluid.fields.graph import CapturedGraph
 from wfluid.fields.state import State
 from wfluid.kernels.cell.layout import Layout
 from wfluid.model.fluid import Fluid
@@ -52,7 +52,6 @@ class Solver:
     solver is for one thread at a time; several may each have their own.
     """
 
-    @exclusive
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
@@ -65,7 +64,6 @@ class Solver:
         self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
         self._pool = self._stages.helpers()
 
-    @exclusive
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
         """A new state: a still fluid under an untouched picture, with its densities as they begin.
 
@@ -83,20 +81,18 @@ class Solver:
         for density, rho in zip(self._stages.densities, state.rho, strict=True):
             density.begin(rho)
         if points.size:
-            state.p_x.assign(points[:, 0] / self.grid.hx)
-            state.p_y.assign(points[:, 1] / self.grid.hy)
+            assign(points[:, 0] / self.grid.hx, state.p_x)
+            assign(points[:, 1] / self.grid.hy, state.p_y)
         return state
 
-    @exclusive
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
         """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
         self._check(state)
         for values, f, ghosts in zip((u, v), (state.u, state.v), self._stages.velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
             ghosts.fill(f)
-        state.q.zero_()
+        fill(0.0, state.q)
 
-    @exclusive
     def set_map(self, state: State, displacement: np.ndarray) -> None:
         """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
         self._check(state)
@@ -132,7 +128,6 @@ class Solver:
         until = t + dt if until is None else until
         self._graph_for(state_in, state_out, flatten(forces), t, dt, until).launch()
 
-    @exclusive
     def _graph_for(
         self,
         state_in: State,
@@ -165,7 +160,6 @@ class Solver:
             self._preparation = CapturedGraph(self.device, self._stages.follow_medium, self._pool)
         self._preparation.launch()
 
-    @exclusive
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
         stages = self._stages
@@ -175,7 +169,6 @@ class Solver:
             prescribed, removed = self._last_impulses.prescribed, self._last_impulses.removed
         return SolveReport(pressure, stages.diffusion.measure(), divergence, prescribed, removed)
 
-    @exclusive
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
 
@@ -187,15 +180,13 @@ class Solver:
         self._stages.trace(state_in, impulses)
         self._stages.carry_map(state_in, state_out)
 
-    @exclusive
     def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
         """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
         stages = self._ready(state_in, t + dt, dt)
         for f, out in zip(stages.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
-            wp.copy(out, f)
+            copy(f, out)
 
-    @exclusive
     def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
         """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
         self._check(state_in, state_out)

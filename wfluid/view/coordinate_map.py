@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wfluid.domain.grid import Grid
+from wfluid.domain.piecewise import catmull_rom
 from wfluid.domain.walls import Walls
 from wfluid.fields.ghosts import ghost_table
-from wfluid.fields.graph import exclusive
 from wfluid.fields.state import State
 from wfluid.kernels.cell.layout import HALO
 
@@ -26,7 +26,6 @@ class CoordinateMap:
     """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
 
     @classmethod
-    @exclusive
     def of_state(cls, state: State, walls: Walls) -> CoordinateMap:
         """A copy of a state's map."""
         return cls(state.grid, walls, np.stack(state.displacement, axis=2))
@@ -48,7 +47,7 @@ class CoordinateMap:
         spacing = np.array([grid.hx, grid.hy])
         at = places / spacing - 0.5
         first = np.floor(at).astype(int)
-        weights, near = _catmull_rom(at - first), HALO + np.arange(-1, 3)
+        weights, near = catmull_rom(at - first), HALO + np.arange(-1, 3)
         found = places.copy()
         for component, (rule_x, rule_y) in enumerate(
             (self.walls.displacement_x_rules(), self.walls.displacement_y_rules())
@@ -56,13 +55,6 @@ class CoordinateMap:
             columns, signs_x = (a[first[:, :1] + near] for a in ghost_table(grid.nx, rule_x))
             rows, signs_y = (a[first[:, 1:] + near] for a in ghost_table(grid.ny, rule_y))
             values = self.displacement[rows[:, :, None], columns[:, None, :], component]
-            weights_x, weights_y = weights[:, 0] * signs_x, weights[:, 1] * signs_y
+            weights_x, weights_y = weights[..., 0].T * signs_x, weights[..., 1].T * signs_y
             found[:, component] += np.einsum("nj,nji,ni->n", weights_y, values, weights_x)
         return found
-
-
-def _catmull_rom(part: np.ndarray) -> np.ndarray:
-    """Weights of the four values around places between the second and the third, (…, 4)."""
-    t = part[..., None]
-    powers = np.concatenate([np.ones_like(t), t, t**2, t**3], axis=-1)
-    return powers @ (np.array([[0, 2, 0, 0], [-1, 0, 1, 0], [2, -5, 4, -1], [-1, 3, -3, 1]]) / 2)

@@ -8,12 +8,12 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.grid import Grid
+from wfluid.domain.piecewise import catmull_rom
 from wfluid.domain.walls import Walls
-from wfluid.fields.arrays import Vector, field, vector
+from wfluid.fields.arrays import Vector, field, interior, read, upload, vector, zeros
 from wfluid.fields.ghosts import Ghosts
-from wfluid.fields.graph import LAUNCHES, CapturedGraph, exclusive
+from wfluid.fields.graph import CapturedGraph
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.view import lookup
 from wfluid.pictures.picture import Picture
@@ -47,9 +47,7 @@ class PictureOnDevice:
             self.alpha = pixels.shape[2]
             pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], axis=2)
         self.height, self.width, self.channels = pixels.shape
-        self.quads = [
-            wp.array(quad.reshape(-1, QUAD), dtype=lookup.Pixel, device=device) for quad in quads_of(pixels)
-        ]
+        self.quads = [upload(quad.reshape(-1, QUAD), device, lookup.Pixel) for quad in quads_of(pixels)]
 
 
 def quads_of(pixels: np.ndarray) -> list[np.ndarray]:
@@ -67,7 +65,6 @@ class LookUp:
     another's may capture them.
     """
 
-    @exclusive
     def __init__(
         self,
         picture: Picture,
@@ -97,9 +94,7 @@ class LookUp:
         self.stretched = vector(self.strip, device, 2)
         self._still = field(Layout(grid.nx, grid.ny), device)
         self.coordinates = vector(self.layout, device, 2)
-        self.shown = [
-            wp.zeros(self.layout.size, dtype=lookup.Pixel, device=device) for _ in self.source.quads
-        ]
+        self.shown = [zeros(self.layout.size, device, lookup.Pixel) for _ in self.source.quads]
         self._replay: CapturedGraph | None = None
 
     source: PictureOnDevice
@@ -149,17 +144,16 @@ class LookUp:
 
     def launch(self, d_x: wp.array, d_y: wp.array) -> None:
         """Compute the coordinates and pixels of `render`, left in device memory."""
-        with LAUNCHES:
-            self.stretch(d_x, d_y)
-            if self._replay is None:
-                threads = 1 if self.device.is_cuda else min(free_cores(), STRIPS)
-                self._replay = CapturedGraph(self.device, self._look_up, helpers(threads))
+        self.stretch(d_x, d_y)
+        if self._replay is None:
+            threads = 1 if self.device.is_cuda else min(free_cores(), STRIPS)
+            self._replay = CapturedGraph(self.device, self._look_up, helpers(threads))
         self._replay.launch()
 
     def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
         """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
         self.launch(d_x, d_y)
-        quads = [self._to_numpy(out) for out in self.shown]
+        quads = [interior(read(out), self.layout) for out in self.shown]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
         pixels = np.array(pixels[..., : self.source.channels], dtype=np.float32, order="C")  # a copy
         return replace(self.picture, pixels=pixels, alpha=self.source.alpha)
@@ -181,19 +175,7 @@ class LookUp:
         Counted from the centre of the source's first pixel.
         """
         self.launch(d_x, d_y)
-        layout = self.layout
-        grids = [
-            f.numpy()[: layout.size // layout.pitch * layout.pitch].reshape(-1, layout.pitch)
-            for f in self.coordinates
-        ]
-        cut = slice(HALO, HALO + self.height), slice(HALO, HALO + self.width)
-        return np.stack([grid[cut] for grid in grids], axis=2)
-
-    def _to_numpy(self, out: wp.array) -> np.ndarray:
-        layout = self.layout
-        rows = layout.size // layout.pitch
-        grid = out.numpy()[: rows * layout.pitch].reshape(rows, layout.pitch, QUAD)
-        return grid[HALO : HALO + self.height, HALO : HALO + self.width]
+        return np.stack([interior(read(f), self.layout) for f in self.coordinates], axis=2)
 
     def _look_up(self) -> None:
         self.place()
@@ -208,19 +190,9 @@ def cubic_weights(cells: int, pixels: int) -> tuple[np.ndarray, np.ndarray]:
     position = (np.arange(whole_spans(pixels)) + 0.5) * (cells / pixels) - 0.5
     position = np.minimum(position, cells - 0.5)  # the padding of the last span reads inside
     before = np.floor(position).astype(int)
-    t = position - before
-    return before, np.stack([_outer(t), _inner(t), _inner(1 - t), _outer(1 - t)])
+    return before, catmull_rom(position - before)
 
 
 def _tables(before: np.ndarray, weights: np.ndarray, start: int, device: wp.Device) -> list[wp.array]:
-    """They on the device, centres counted from `start`."""
-    index = wp.array(before + start, dtype=wp.int32, device=device)
-    return [index, *(wp.array(weight, dtype=Real, device=device) for weight in weights)]
-
-
-def _outer(t: np.ndarray) -> np.ndarray:
-    return t * (-0.5 + t * (1.0 - 0.5 * t))
-
-
-def _inner(t: np.ndarray) -> np.ndarray:
-    return 1.0 + t * t * (-2.5 + 1.5 * t)
+    """The tables in device memory; indices of centres are offset by `start`."""
+    return [upload(before + start, device, wp.int32), *(upload(weight, device) for weight in weights)]

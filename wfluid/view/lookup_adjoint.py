@@ -9,12 +9,10 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.walls import Rule
-from wfluid.fields.arrays import vector
+from wfluid.fields.arrays import fill, upload, vector
 from wfluid.fields.ghosts import ghost_table
-from wfluid.fields.graph import exclusive
 from wfluid.kernels.adjoint import lookup as lookup_adjoint
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, together
 from wfluid.view.lookup import LookUp, cubic_weights
 
@@ -35,7 +33,6 @@ class LookUpAdjoint:
         KeyError: a filter without an adjoint.
     """
 
-    @exclusive
     def __init__(self, look_up: LookUp):
         self._look_up, self._program = look_up, ADJOINTS[look_up.filter]
         grid, walls, device = look_up.grid, look_up.walls, look_up.device
@@ -52,7 +49,7 @@ class LookUpAdjoint:
 
     def begin(self) -> None:
         """Forget what was read before."""
-        alone(lambda: [f.zero_() for f in self.coordinates_bar])
+        alone(lambda: fill(0.0, *self.coordinates_bar))
 
     def read(self, quad: int, shown_bar: wp.array) -> None:
         """Add to `coordinates_bar`, from the gradient with respect to `LookUp.shown[quad]`."""
@@ -96,7 +93,7 @@ def transposed(cells: int, pixels: int, rule: Rule, device: wp.Device) -> list[w
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], np.arange(whole_spans(cells) + 1))
     return [
-        wp.array(first, dtype=wp.int32, device=device),
-        wp.array(order // 4, dtype=wp.int32, device=device),
-        wp.array(weight[order], dtype=Real, device=device),
+        upload(first, device, wp.int32),
+        upload(order // 4, device, wp.int32),
+        upload(weight[order], device),
     ]

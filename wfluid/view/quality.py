@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
-from wfluid.fields.graph import exclusive
+from wfluid.fields.arrays import read, zeros
 from wfluid.fields.state import State
-from wfluid.kernels.cell.real import Real
 from wfluid.kernels.view import quality
 from wfluid.view.coordinate_map import CoordinateMap
 
@@ -30,19 +28,18 @@ class MapQuality:
     """Fraction of the cells whose source lies beyond a closed edge."""
 
 
-@exclusive
 def measure_map(state: State, warp: CoordinateMap) -> MapQuality:
     """The measures of a state's map; `warp` is the host's copy of that map (`CoordinateMap.of_state`)."""
     layout, device, grid = state.layout, state.u.device, state.grid
-    least, greatest, outside = (wp.empty(layout.ny, dtype=Real, device=device) for _ in range(3))
+    least, greatest, outside = (zeros(layout.ny, device) for _ in range(3))
     closed = [int(not periodic) for periodic in warp.walls.periodic]
     inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
     quality.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
     length = np.hypot(*np.moveaxis(warp.displacement, 2, 0))
     return MapQuality(
-        float(least.numpy().min()),
-        float(greatest.numpy().max()),
+        float(read(least).min()),
+        float(read(greatest).max()),
         float(length.max()),
         float(length.mean()),
-        float(outside.numpy().sum()) / (grid.nx * grid.ny),
+        float(read(outside).sum()) / (grid.nx * grid.ny),
     )

@@ -1,0 +1,28 @@
+"""The lock of all calls of Warp that a capture would take in.
+
+A capture records whatever any thread launches, allocates, copies or writes meanwhile. So launches hold the
+lock (`cell/program`), and so do the functions that make and write arrays (`wfluid/fields/arrays`), and each
+capture from its beginning to its end (`wfluid/fields/graph`). Replays need none.
+"""
+
+import threading
+from collections.abc import Callable
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+LAUNCHES = threading.RLock()
+"""Held while Warp launches, allocates, copies, or captures."""
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+def exclusive(work: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Hold `LAUNCHES` while `work` runs."""
+
+    @wraps(work)
+    def held(*arguments: _Arguments.args, **settings: _Arguments.kwargs) -> _Result:
+        with LAUNCHES:
+            return work(*arguments, **settings)
+
+    return held
