@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wfluid import Picture
-from wfluid.pictures.pairing import FITS, Window, alike, paired, seen, window
+from wfluid.pictures.pairing import FITS, Window, alike, cropped, paired, window
 from wfluid.pictures.picture import resample
 
 SIZES = [
@@ -68,7 +68,7 @@ def noise(width, height, channels=3, seed=0):
 def test_what_is_seen_is_the_pixels_of_the_window_and_black_beyond(through):
     """Pixel by pixel, by the definition."""
     picture = noise(20, 12)
-    got = seen(picture, through).pixels
+    got = cropped(picture, through).pixels
     assert got.shape == (through.height, through.width, 3)
     for row in range(through.height):
         for column in range(through.width):
@@ -79,8 +79,8 @@ def test_what_is_seen_is_the_pixels_of_the_window_and_black_beyond(through):
 
 def test_a_picture_that_is_seen_whole_is_the_same_object():
     picture = noise(20, 12)
-    assert seen(picture, Window(0, 0, 20, 12)) is picture
-    assert seen(picture, Window(1, 0, 19, 12)) is not picture
+    assert cropped(picture, Window(0, 0, 20, 12)) is picture
+    assert cropped(picture, Window(1, 0, 19, 12)) is not picture
 
 
 def test_bars_are_transparent_where_there_is_alpha():

@@ -19,9 +19,12 @@ LEAST_DELAY = 2
 
 
 class GifWriter:
-    """An animated GIF that loops for ever: PyAV writes it where installed, else OpenImageIO.
+    """An animated GIF that loops for ever, written with PyAV where that is installed, else with OpenImageIO.
 
-    GIF counts in hundredths of a second: the delays are spread so that their mean is 1 / fps.
+    Delays are whole hundredths of a second: they vary by one, so that their mean is 1 / fps.
+
+    Raises:
+        PictureError: a frame rate that no delay gives.
     """
 
     def __init__(self, path: Path, fps: float):
@@ -33,29 +36,30 @@ class GifWriter:
         self._frames: list[np.ndarray] = []
 
     def write(self, picture: Picture) -> None:
-        """Keep the frame: the format wants their number first."""
+        """Keep the frame: one palette is made for all of them."""
         self._frames.append(display_rgb(picture))
 
     def close(self) -> None:
         """Write the file, if there are frames."""
         if not self._frames:
             return
+        hundredths = delays(len(self._frames), self.fps)
         with atomic_file(self.path) as temporary:
             if movie.available():
-                movie.write_gif(temporary, self._frames)
+                movie.write_gif(temporary, self._frames, hundredths)
             else:
-                _write_gif(temporary, self._frames)
-            data = bytearray(temporary.read_bytes())
-            set_delays(data, delays(len(self._frames), self.fps))
-            temporary.write_bytes(data)
+                _write_gif(temporary, self._frames, hundredths)
         self.written.append(self.path)
 
     def abandon(self) -> None:
-        """Nothing is on the disk before `close`."""
+        """Nothing is written before `close`."""
 
 
-def _write_gif(path: Path, frames: list[np.ndarray]) -> None:
-    """Write 8-bit RGB frames as a GIF with OpenImageIO, a palette a frame."""
+def _write_gif(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> None:
+    """Write 8-bit RGB frames as a GIF with OpenImageIO: a palette for each frame, one delay for all.
+
+    The delays are therefore written into the finished file.
+    """
     import OpenImageIO as oiio
 
     height, width, channels = frames[0].shape
@@ -68,16 +72,23 @@ def _write_gif(path: Path, frames: list[np.ndarray]) -> None:
     message = out.geterror()
     if not (out.close() and done):
         raise PictureError(f"{path}: cannot be written ({message.strip() or 'no reason given'})")
+    data = bytearray(path.read_bytes())
+    set_delays(data, hundredths)
+    path.write_bytes(data)
 
 
 def delays(frames: int, fps: float) -> list[int]:
-    """Delay of each frame [1/100 s]: whole, never below 2, their sum the animation's length rounded."""
+    """Delay of each frame [1/100 s]: whole, 2 or more, their sum the rounded length of the animation."""
     edges = np.floor(np.arange(frames + 1) * (100.0 / fps) + 0.5 + 1e-9).astype(int)
     return [max(LEAST_DELAY, int(delay)) for delay in np.diff(edges)]
 
 
 def set_delays(gif: bytearray, hundredths: list[int]) -> None:
-    """Write each frame's delay into a GIF's graphic control extensions (GIF89a, section 23), in place."""
+    """Write each frame's delay into a GIF's graphic control extensions (GIF89a, section 23), in place.
+
+    Raises:
+        PictureError: another number of delays than of frames.
+    """
     at = 13 + _table_size(gif[10])
     frame = 0
     while gif[at] != 0x3B:  # the trailer

@@ -1,4 +1,4 @@
-"""Animations as files: numbered pictures, GIF and movies. The name decides."""
+"""Animations as files: numbered stills, GIF or movies, chosen by the name."""
 
 from __future__ import annotations
 
@@ -11,34 +11,34 @@ from wfluid.files import movie
 from wfluid.files.gif import GifWriter
 from wfluid.files.movie import MovieWriter
 from wfluid.files.names import FIRST_FRAME, check_folder, numbering
-from wfluid.files.sequence import Sequence
+from wfluid.files.stills import StillsWriter
 from wfluid.pictures.formats import Encoding, PictureError
 from wfluid.pictures.picture import Picture
 
 
 class FrameWriter(Protocol):
-    """Where frames go, in order; nothing is there under its final name before it is whole."""
+    """Writes frames in their order; a file has its final name only once it is complete."""
 
     written: list[Path]
-    """Files that are finished."""
+    """Finished files."""
 
     def write(self, picture: Picture) -> None:
         """Take the next frame."""
         ...
 
     def close(self) -> None:
-        """Finish what is written one file for all frames."""
+        """Finish the file, where one holds all frames."""
         ...
 
     def abandon(self) -> None:
-        """Remove what is unfinished."""
+        """Remove unfinished files."""
         ...
 
 
 def open_output(
     path: str | os.PathLike, fps: float, start: int = FIRST_FRAME, encoding: Encoding | None = None
 ) -> FrameWriter:
-    """The output for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
+    """The writer for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
 
     `start` is the number of a sequence's first frame, `encoding` how its stills are written.
 
@@ -53,7 +53,7 @@ def open_output(
         encoding.check(path)
         if start < 0:
             raise PictureError(f"first frame {start}: expected 0 or more")
-        return Sequence(path, numbered, start, encoding)
+        return StillsWriter(path, numbered, start, encoding)
     ending = path.suffix.lower()
     if ending == ".gif":
         return GifWriter(path, fps)
@@ -81,7 +81,7 @@ def write_animation(
     start: int = FIRST_FRAME,
     encoding: Encoding | None = None,
 ) -> list[Path]:
-    """Write frames as they come; returns the files written.
+    """Write frames one by one as they are computed; returns the files written.
 
     Raises:
         PictureError: see `open_output`; nothing unfinished is left behind.

@@ -1,4 +1,4 @@
-"""Points and where they should be, read from a table of comma-separated values."""
+"""Pairs of points and destinations, read from a table of comma-separated values."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from wfluid.pictures.formats import PictureError
 
 COLUMNS = ("from x", "from y", "to x", "to y", "time")
-"""What the columns are, the last of which may be left out; a file may name them as it likes."""
+"""Meaning of the columns, the last of which is optional; a file may use other names."""
 
 _SEPARATORS = "\t;,"
 _LONGEST = 30  # characters of a file that a message quotes
@@ -21,26 +21,26 @@ _LONGEST = 30  # characters of a file that a message quotes
 
 @dataclass(frozen=True)
 class PointRow:
-    """A point of one picture and where it should be."""
+    """A point and its destination."""
 
     line: int
     """Line of the file, from 1."""
     source: tuple[float, float]
-    """Where the point is, x and y [px]."""
+    """The point, x and y [px]."""
     target: tuple[float, float]
-    """Where it should be, x and y [px]."""
+    """Its destination, x and y [px]."""
     time: float | None
-    """When [s], after 0; None where the file does not say."""
+    """Time of arrival [s], after 0; None where the file has none."""
 
 
 def read_points(path: str | os.PathLike) -> list[PointRow]:
-    """The rows of a table with the columns from x, from y, to x, to y [px], and, if wanted, time [s].
+    """The rows of a table with the columns from x, from y, to x, to y [px] and, optionally, time [s].
 
-    Columns are separated by commas, semicolons or tabs. The first row may name them; blank lines, and
-    those that begin with #, are skipped. Whether the places lie in a picture is not asked here.
+    Columns are separated by commas, semicolons or tabs. The first row may name them. Blank lines and lines
+    that begin with # are skipped. Points are not compared with the size of a picture.
 
     Raises:
-        PictureError: no such file, no text, no points, or the line that is wrong and what is.
+        PictureError: a file that is missing, no text or has no points; or an invalid line, with its number.
     """
     path, found = Path(path), []
     names: Sequence[str] | None = None
@@ -64,7 +64,7 @@ def read_points(path: str | os.PathLike) -> list[PointRow]:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """The lines that say something, with their numbers."""
+    """The lines that hold data, with their numbers."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -78,16 +78,16 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _separator_of(line: str) -> str:
-    """What separates a line's fields: what makes as many of them as there should be, if anything does."""
+    """The separator of a line's fields: the one that gives 4 or 5 fields, else the one that gives most."""
     counts = {separator: len(_split(line, separator)) for separator in _SEPARATORS}
     return next((one for one in counts if counts[one] in (4, 5)), max(counts, key=counts.get))
 
 
 def _fields(line: str, separator: str) -> list[str]:
-    """The fields of a line, without spaces around them: 4 or 5, unless they are all empty.
+    """The fields of a line, stripped of spaces: 4 or 5, unless all are empty.
 
     Raises:
-        ValueError: another number of them, or a quote that is not closed.
+        ValueError: another number of fields, or a quote that is not closed.
     """
     if line.count('"') % 2:
         raise ValueError("a quote is not closed")
@@ -109,7 +109,7 @@ def _row_of(number: int, row: Sequence[str], names: Sequence[str]) -> PointRow:
     """The row of a line's fields.
 
     Raises:
-        ValueError: a field that is missing or no number, with its column.
+        ValueError: a field that is missing or not a number, with the name of its column.
     """
     from_x, from_y, to_x, to_y = (_value(text, name) for name, text in zip(names, row[:4], strict=False))
     time = _value(row[4], names[4]) if len(row) == 5 and row[4] else None

@@ -1,4 +1,4 @@
-"""Where followed points are, as a table of comma-separated values."""
+"""Positions of tracked points, as a table of comma-separated values."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ class TrackWriter:
     """A CSV file with a row a frame and point: frame, time [s], point (from 0), x, y [px].
 
     Pixels are those of a frame whose longer side is `side`.
+
+    Raises:
+        PictureError: a name that does not end in .csv.
     """
 
     def __init__(self, path: Path, side: float):
@@ -26,7 +29,7 @@ class TrackWriter:
         self._frames = 0
 
     def write(self, time: float, points: Sequence[tuple[float, float]] | np.ndarray) -> None:
-        """Take the next frame's points [longer side]."""
+        """Add the next frame's points [longer side]."""
         for n, (x, y) in enumerate(points):
             self._rows.append(f"{self._frames},{time:.6g},{n},{x * self._side:.4f},{y * self._side:.4f}")
         self._frames += 1
@@ -39,4 +42,4 @@ class TrackWriter:
             self.written.append(self.path)
 
     def abandon(self) -> None:
-        """Nothing is on the disk before `close`."""
+        """Nothing is written before `close`."""

@@ -104,7 +104,7 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
     """
     if isinstance(picture, Picture):
         values, alpha = as_stored(picture), picture.alpha
-        channels = [channel for channel in range(values.shape[2]) if channel != alpha][:2]
+        channels = picture.color_channels[:2]
         if len(channels) < 2:
             raise ValueError("a picture of vectors needs two channels")
         opacity = 1.0 if alpha is None else values[..., [alpha]]

@@ -1,4 +1,4 @@
-"""Two pictures of one kind, mixed."""
+"""Blends of two pictures."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from wfluid.pictures import color
 from wfluid.pictures.picture import Picture
 
 BLEND_SPACES = ("linear", "display")
-"""What is mixed: light, or the numbers that a display is sent (sRGB)."""
+"""What is blended: linear light, or display values (sRGB)."""
 
 
 def check_light(light: str) -> None:
-    """Refuse a light that does not exist.
+    """Refuse an unknown space to blend in.
 
     Raises:
-        ValueError: with those that do.
+        ValueError: with the known ones.
     """
     if light not in BLEND_SPACES:
         raise ValueError(f"blend in {light!r} light: expected one of {', '.join(BLEND_SPACES)}")
 
 
 def blended(a: Picture, b: Picture, weight: float | np.ndarray, light: str = "linear") -> Picture:
-    """A mix of two pictures of one size: of b so much as `weight` says, a number or (height, width), 0 … 1.
+    """(1 - weight) a + weight b, for pictures of one size; the weight is a number or (height, width), 0 … 1.
 
-    Where that is 0 or 1 everywhere it is one of them, to the bit.
+    A weight of 0 or 1 everywhere gives one of the two pictures, bit by bit.
     """
     weight = np.asarray(weight, dtype=np.float32)
     if not weight.any() or np.all(weight == 1):
@@ -41,11 +41,11 @@ def _mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def _displayed(pixels: np.ndarray, alpha: int | None, transfer=color.to_srgb) -> np.ndarray:
-    """Premultiplied values, through a transfer function of what is not multiplied."""
+    """Premultiplied values after a transfer function, which is applied to values divided by alpha."""
     if alpha is None:
         return transfer(pixels)
     opacity = pixels[..., [alpha]]
-    whole = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
-    shown = transfer(whole) * opacity
+    straight = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
+    shown = transfer(straight) * opacity
     shown[..., [alpha]] = opacity
     return shown

@@ -11,7 +11,7 @@ _LADDER = 1 << 16
 
 
 def to_linear(encoded: np.ndarray) -> np.ndarray:
-    """Scene-linear values of sRGB-encoded ones, odd about zero so that nothing is cut off."""
+    """Scene-linear values of sRGB-encoded ones; an odd function, so that negative values are kept."""
     size = np.abs(encoded)
     linear = np.where(size <= 0.04045, size / 12.92, ((size + 0.055) / 1.055) ** 2.4)
     return np.copysign(linear, encoded).astype(np.float32)
@@ -34,7 +34,7 @@ def decode(stored: np.ndarray, srgb: bool) -> np.ndarray:
 
 
 def encode(linear: np.ndarray, dtype: str, srgb: bool) -> np.ndarray:
-    """Linear light as numbers of `dtype`, rounded to the nearest code, stopped at the type's range."""
+    """Linear light as numbers of `dtype`, rounded to the nearest code within the range of the type."""
     top = _CODES.get(dtype)
     if top is None:
         return (to_srgb(linear) if srgb else linear).astype(dtype)
@@ -58,7 +58,7 @@ def _srgb_codes() -> np.ndarray:
 
 
 def linear_color(text: str) -> tuple[float, float, float]:
-    """Red, green and blue in linear light of a display colour "#rrggbb"."""
+    """Red, green and blue in linear light of a display colour, written "#rrggbb"."""
     codes = np.array([int(text[n : n + 2], 16) for n in (1, 3, 5)], dtype=np.uint8)
     red, green, blue = (float(value) for value in decode(codes, True))
     return red, green, blue

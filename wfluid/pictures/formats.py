@@ -1,4 +1,4 @@
-"""What formats of stills can hold, and how they are encoded."""
+"""Formats of stills: the number types, channels and encodings of each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ TYPES = ("uint8", "uint16", "half", "float")
 """Number types a picture is written with."""
 
 LARGEST = 65504.0
-"""What an infinite value becomes on reading (the largest half): filters would spread it as NaN."""
+"""The largest half, which replaces infinite values on reading: filters would spread them as NaN."""
 
 NUMPY = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
 WRITES = {
@@ -27,10 +27,10 @@ WRITES = {
     ".bmp": ("uint8",),
     ".dpx": ("uint8", "uint16"),
 }
-"""Formats written as stills, and the number types of each, the first one being the default."""
+"""Formats that stills are written in, and the number types of each, the default first."""
 
 CHANNELS = {".jpg": 3, ".jpeg": 3, ".hdr": 3, ".bmp": 3, ".png": 4, ".webp": 4, ".tga": 4, ".dpx": 4}
-"""Most channels that a format holds, where that is few; with 3 there is no alpha among them."""
+"""Most channels that a format holds, where that is limited; 3 channels include no alpha."""
 
 _COMPRESSIONS = {
     ".exr": ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"),
@@ -49,10 +49,10 @@ class PictureError(ValueError):
 
 @dataclass(frozen=True)
 class Encoding:
-    """How a still is written; what is None follows the picture and the format.
+    """How a still is written; None leaves a setting to the picture and the format.
 
     Raises:
-        PictureError: a value that no format has.
+        PictureError: a value that no format supports.
     """
 
     type: str | None = None
@@ -72,10 +72,10 @@ class Encoding:
             raise PictureError(f"quality {self.quality}: expected 1 … 100")
 
     def check(self, path: Path) -> None:
-        """Refuse what the format of `path` does not have.
+        """Refuse settings that the format of `path` does not support.
 
         Raises:
-            PictureError: an unknown ending, or a setting its format lacks, with what it has.
+            PictureError: an unknown ending, or an unsupported setting, with the supported ones.
         """
         ending = path.suffix.lower()
         if ending not in WRITES:
@@ -92,5 +92,5 @@ class Encoding:
 
 
 def first_line(message: str) -> str:
-    """The first line of what a library says, which may be nothing."""
+    """The first line of a library's message, which may be empty."""
     return message.strip().splitlines()[0] if message.strip() else "no reason given"

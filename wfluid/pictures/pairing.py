@@ -10,7 +10,7 @@ from wfluid.domain.paths import Place
 from wfluid.pictures.picture import Picture
 
 FITS = ("fill", "fit", "stretch")
-"""Cut off what is over; leave bars; change the aspect."""
+"""Crop the picture; add bars; change its aspect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,19 +20,19 @@ class PicturePair:
     a: Picture
     """The first picture."""
     b: Picture
-    """What is seen of the second, to be stretched over the frame."""
+    """The visible part of the second picture, to be stretched over the frame."""
     window: Window
-    """What that is."""
+    """The pixels of the second picture that are visible."""
     size: tuple[int, int]
-    """Width and height of all of the second picture [px]."""
+    """Width and height of the second picture before it was cropped [px]."""
     notes: tuple[str, ...]
-    """What was done to them that a user should know."""
+    """Changes to the pictures that a user should know."""
 
     def place(self, point: Place, extent: tuple[float, float]) -> Place:
-        """Where in a frame of that extent [longer side] a point of the second picture [px] is seen.
+        """The place of a point of the second picture [px] in a frame of that extent [longer side].
 
         Raises:
-            ValueError: a point that is outside the picture, or cut off.
+            ValueError: a point outside the picture, or in a part that is cropped.
         """
         (x, y), (width, height), through = point, self.size, self.window
         shown = f"the point {x:.6g},{y:.6g} of the second picture"
@@ -45,44 +45,45 @@ class PicturePair:
 
 @dataclass(frozen=True)
 class Window:
-    """The pixels of a picture that cover a frame: beyond its edges where there are bars."""
+    """A rectangle of a picture that covers a frame; it exceeds the picture where there are bars."""
 
     x: int
-    """Of its left edge [px]."""
+    """Left edge [px]."""
     y: int
-    """Of its top edge [px]."""
+    """Top edge [px]."""
     width: int
-    """Pixels along x, 1 or more."""
+    """Width [px], 1 or more."""
     height: int
-    """Pixels along y, 1 or more."""
+    """Height [px], 1 or more."""
 
     def pixels(self, extent: tuple[float, float]) -> np.ndarray:
-        """Pixels of the picture that one longer side of the frame shows, along x and y."""
+        """Pixels of the picture along x and y that correspond to one longer side of the frame."""
         return np.array([self.width / extent[0], self.height / extent[1]])
 
 
-def window(size: tuple[int, int], frame: tuple[int, int], how: str) -> Window:
-    """What of a picture of a size covers a frame, both (width, height) [px], to the nearest whole pixel.
+def window(size: tuple[int, int], frame: tuple[int, int], fit: str) -> Window:
+    """The window of a picture that covers a frame, sizes as (width, height) [px], to the nearest pixel.
 
-    "fill" shows its middle, as large as the frame's aspect allows; "fit" all of it with bars; "stretch" all.
+    "fill" shows the largest middle part with the frame's aspect, "fit" the full picture with bars,
+    "stretch" the full picture with its aspect changed.
 
     Raises:
-        ValueError: no such fit.
+        ValueError: an unknown fit.
     """
-    if how not in FITS:
-        raise ValueError(f"fit {how!r}: expected one of {', '.join(FITS)}")
+    if fit not in FITS:
+        raise ValueError(f"fit {fit!r}: expected one of {', '.join(FITS)}")
     width, height = size
-    if how == "stretch":
+    if fit == "stretch":
         return Window(0, 0, width, height)
     aspect = frame[0] / frame[1]
-    if (width > height * aspect) == (how == "fill"):
-        seen = max(1, round(height * aspect)), height
+    if (width > height * aspect) == (fit == "fill"):
+        visible = max(1, round(height * aspect)), height
     else:
-        seen = width, max(1, round(width / aspect))
-    return Window((width - seen[0]) // 2, (height - seen[1]) // 2, *seen)
+        visible = width, max(1, round(width / aspect))
+    return Window((width - visible[0]) // 2, (height - visible[1]) // 2, *visible)
 
 
-def seen(picture: Picture, through: Window) -> Picture:
+def cropped(picture: Picture, through: Window) -> Picture:
     """The pixels in a window; outside the picture they are 0: black, and transparent where there is alpha."""
     if (through.x, through.y, through.width, through.height) == (0, 0, picture.width, picture.height):
         return picture
@@ -97,24 +98,25 @@ def paired(a: Picture, b: Picture, fit: str) -> PicturePair:
     """Two pictures as a morph needs them: see `window` and `alike`.
 
     Raises:
-        ValueError: no such fit; pictures that cannot be blended.
+        ValueError: an unknown fit, or pictures that cannot be blended.
     """
     through = window((b.width, b.height), (a.width, a.height), fit)
     first, second, notes = alike(a, b)
-    return PicturePair(first, seen(second, through), through, (b.width, b.height), tuple(notes))
+    return PicturePair(first, cropped(second, through), through, (b.width, b.height), tuple(notes))
 
 
 def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:
-    """Both pictures with the same channels, and what was added: grey shown as colour, opaque alpha.
+    """Both pictures with the same channels, and notes on what was added: colours for grey, opaque alpha.
 
     Raises:
-        ValueError: other numbers of colours than 1 and 3 that differ; data and colours.
+        ValueError: numbers of colours that differ and are not 1 and 3; data with colours.
     """
     if a.data != b.data:
         raise ValueError("one picture has colours, the other numbers (data): they cannot be blended")
     if (a.pixels.shape[2], a.alpha) == (b.pixels.shape[2], b.alpha):
         return a, b, []
-    notes, pixels, names = [], [_colours(a), _colours(b)], ("the first", "the second")
+    pixels = [picture.pixels[..., picture.color_channels] for picture in (a, b)]
+    notes, names = [], ("the first", "the second")
     counts = [values.shape[2] for values in pixels]
     if counts[0] != counts[1]:
         if sorted(counts) != [1, 3]:
@@ -134,9 +136,3 @@ def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:
             pixels[n] = np.concatenate([pixels[n], opacity], axis=2)
     a, b = (replace(one, pixels=its, alpha=alpha) for one, its in zip((a, b), pixels, strict=True))
     return a, b, notes
-
-
-def _colours(picture: Picture) -> np.ndarray:
-    """All channels but alpha."""
-    channels = [channel for channel in range(picture.pixels.shape[2]) if channel != picture.alpha]
-    return picture.pixels[..., channels]

@@ -1,4 +1,4 @@
-"""Pictures: read and written through OpenImageIO, held in linear light with premultiplied alpha."""
+"""Pictures in linear light with premultiplied alpha."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Picture:
     metadata: Any = None
     """The OpenImageIO `ImageSpec` it came with, for writing."""
     srgb: bool | None = None
-    """Whether the file's numbers were sRGB; None for what its number type says."""
+    """Whether the file's numbers were sRGB; None: as is usual for its number type."""
     data: bool = False
-    """Whether its numbers are no colours, so that no file converts them."""
+    """Whether the numbers are not colours, so that files store them unconverted."""
 
     @property
     def width(self) -> int:
@@ -41,19 +41,29 @@ class Picture:
         """Pixels along y."""
         return self.pixels.shape[0]
 
+    @property
+    def color_channels(self) -> list[int]:
+        """Indices of all channels but alpha."""
+        return channels_beside(self.alpha, self.pixels.shape[2])
+
     def resized(self, width: int, height: int) -> Picture:
-        """The picture at another size, filtered so that shrinking does not alias."""
+        """The picture at another size, filtered against aliasing where it shrinks."""
         if (width, height) == (self.width, self.height):
             return self
         return self.with_pixels(resample(self.pixels, width, height, filter=""))
 
     def shrunk(self, width: int, height: int) -> Picture:
-        """The picture for frames of a size: shrunk where it is larger, so that they do not alias."""
+        """The picture for frames of a size: shrunk where it is larger, against aliasing."""
         return self.resized(min(width, self.width), min(height, self.height))
 
     def with_pixels(self, pixels: np.ndarray) -> Picture:
         """The same kind of picture with other pixels."""
         return replace(self, pixels=pixels)
+
+
+def channels_beside(alpha: int | None, channels: int) -> list[int]:
+    """Indices of so many channels but for that of alpha."""
+    return [channel for channel in range(channels) if channel != alpha]
 
 
 def resample(values: np.ndarray, width: int, height: int, filter: str = "triangle") -> np.ndarray:
@@ -77,8 +87,7 @@ def resample(values: np.ndarray, width: int, height: int, filter: str = "triangl
 
 def as_stored(picture: Picture) -> np.ndarray:
     """The numbers of the picture's file, integers scaled to 0 … 1, colours not multiplied by alpha."""
-    pixels, alpha = picture.pixels, picture.alpha
-    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha]
+    pixels, alpha, colours = picture.pixels, picture.alpha, picture.color_channels
     stored = pixels.copy()
     if alpha is not None:
         opacity = pixels[..., [alpha]]
@@ -91,14 +100,14 @@ def as_stored(picture: Picture) -> np.ndarray:
 
 
 _RINGING = 1e-3
-"""How far below zero a filter may have left a value that was painted 0."""
+"""How far below zero the ringing of a filter may leave a value that was painted 0."""
 
 
 def intensity(picture: Picture) -> np.ndarray:
     """Intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
 
-    Luminance of the file's numbers (Rec. 709 weights), which are display values in 8- and 16-bit files;
-    what is above the range is cut off; times alpha.
+    It is the luminance of the file's numbers (Rec. 709 weights), which are display values in 8- and 16-bit
+    files, limited to 1 and multiplied by alpha.
 
     Raises:
         PictureError: a value that is negative or not finite.
@@ -107,20 +116,19 @@ def intensity(picture: Picture) -> np.ndarray:
     wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
     if wrong.any():
         raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
-    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
-    colours = [channel for channel in range(pixels.shape[2]) if channel != alpha][:3]
+    colours = picture.color_channels[:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)
     stored = as_stored(picture)
     grey = sum(weight * stored[..., channel] for weight, channel in zip(weights, colours, strict=False))
     opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
-    return np.round(np.clip(grey, 0.0, 1.0) * opacity, 6)  # full is 1: conversions round below that
+    return np.round(np.clip(grey, 0.0, 1.0) * opacity, 6)  # white is 1: conversions may round to less
 
 
 def encode(picture: Picture, dtype: str, linear: bool, channels: int) -> tuple[np.ndarray, int | None]:
-    """A picture's numbers as a file of at most `channels` channels stores them, and which is alpha.
+    """A picture's numbers as a file of at most `channels` channels stores them, and the index of alpha.
 
-    With up to three channels there is no alpha. In linear files it stays premultiplied; in display files
-    it is divided out first.
+    Files of up to three channels hold no alpha. In linear files colours stay premultiplied; in display
+    files they are divided by alpha first.
     """
     pixels, alpha = picture.pixels, picture.alpha
     if alpha is not None and channels <= 3:

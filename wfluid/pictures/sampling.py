@@ -1,19 +1,19 @@
-"""How a picture is read between its pixels and beyond its edges, in words."""
+"""Names of the filters and edges with which a picture is sampled."""
 
 from __future__ import annotations
 
 FILTERS = ("nearest", "bilinear", "cubic", "lanczos")
-"""How a picture is read between its pixels."""
+"""Interpolation between pixels."""
 
 EDGES = ("clamp", "mirror", "wrap", "transparent")
-"""What lies beyond a picture; programs know an edge by its place here."""
+"""Values beyond the edges of a picture; kernels are given an edge by its index here."""
 
 
 def check_look_up(filter: str, edge: str) -> None:
-    """Refuse a filter or an edge that does not exist.
+    """Refuse an unknown filter or edge.
 
     Raises:
-        ValueError: with those that do.
+        ValueError: with the known ones.
     """
     for name, value, known in (("filter", filter, FILTERS), ("edge", edge, EDGES)):
         if value not in known:

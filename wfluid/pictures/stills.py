@@ -20,7 +20,7 @@ from wfluid.pictures.formats import (
     PictureError,
     first_line,
 )
-from wfluid.pictures.picture import Picture, encode
+from wfluid.pictures.picture import Picture, channels_beside, encode
 from wfluid.system.atomic import atomic_file
 from wfluid.system.memory import free_memory, readable_size
 from wfluid.system.stderr import quiet_stderr
@@ -46,13 +46,13 @@ _UPRIGHT = {
 def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
     """Read a still in any format that OpenImageIO reads; of several in one file, the first.
 
-    `colorspace` says what the numbers are: "srgb", "linear", or "auto": sRGB for integers, linear for
-    half and float; "data" are no colours, and written as they are read. Alpha is never linearised; where
-    it is unassociated it multiplies the colours once they are linear. The picture is turned upright by
-    its EXIF orientation.
+    `colorspace` is that of the file's numbers: "srgb", "linear", "auto" (sRGB for integers, linear for half
+    and float) or "data" (not colours: they are written as they are read). Alpha is never linearised; colours
+    that are not premultiplied are multiplied by it once they are linear. The EXIF orientation is applied.
+    Values that are not finite become 0 or the largest half; with `exact` they are refused.
 
     Raises:
-        PictureError: no such file, one that cannot be read, is damaged, or is too large for the memory.
+        PictureError: a file that is missing, cannot be read, is damaged or too large for the memory.
     """
     import OpenImageIO as oiio
 
@@ -89,7 +89,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     for channel in range(spec.nchannels):
         pixels[..., channel] = color.decode(stored[..., channel], srgb and channel != alpha)
     if alpha is not None and spec.get_int_attribute("oiio:UnassociatedAlpha"):
-        colours = [channel for channel in range(spec.nchannels) if channel != alpha]
+        colours = channels_beside(alpha, spec.nchannels)
         pixels[..., colours] *= pixels[..., [alpha]]
     if exact and not np.isfinite(pixels).all():
         raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
@@ -99,11 +99,11 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
 
 
 def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
-    """Write a still in the format that the name's ending says, whole or not at all.
+    """Write a still, completely or not at all, in the format of the name's ending.
 
     The number type is the picture's own where the format has it, else the format's default. Alpha and
-    further channels are dropped where the format has no room (alpha over black). Metadata travel, and
-    windows where the size is still the source's.
+    further channels are dropped where the format does not hold them (alpha over black). Metadata are kept;
+    so are display and data windows, if the size is still that of the source.
 
     Raises:
         PictureError: a format or setting that does not exist, or the file cannot be written.
@@ -136,7 +136,7 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
 
 
 def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):
-    """The picture's own spec where it has one, made to fit."""
+    """The spec of the file that the picture came from, if any, adapted to shape and number type."""
     import OpenImageIO as oiio
 
     height, width, channels = shape
@@ -160,7 +160,7 @@ def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):
 
 
 def _check_size(path: Path, spec) -> None:
-    """Refuse dimensions that no memory holds, before any is taken."""
+    """Refuse dimensions that exceed the memory, before any is allocated."""
     if not (1 <= spec.width <= SIDE_LIMIT and 1 <= spec.height <= SIDE_LIMIT and spec.depth == 1):
         size = f"{spec.width} x {spec.height} x {spec.depth}"
         raise PictureError(f"{path}: {size} pixels; sides of 1 … {SIDE_LIMIT} can be read")
@@ -181,7 +181,7 @@ def _type_of(format_name: str) -> str:
 
 
 def _message(library) -> str:
-    """OpenImageIO's message; it may quote bytes of a damaged file that are no text."""
+    """OpenImageIO's message; it may quote bytes of a damaged file that are not text."""
     try:
         return library.geterror()
     except UnicodeDecodeError:

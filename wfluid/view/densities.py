@@ -1,4 +1,4 @@
-"""Densities seen over a picture: ink that colours, smoke that covers."""
+"""Densities composited over a picture: ink colours it, smoke covers it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from wfluid.model.densities import Density
 from wfluid.pictures.picture import Picture
 
 DARKEST = 1e-3
-"""Least part of the light that ink of density 1 lets through: a colour of 0 would let none through any."""
+"""Least transmission of ink of density 1: with 0 even the thinnest ink would be opaque."""
 
 
 def upsample(
     values: np.ndarray, width: int, height: int, periodic: tuple[bool, bool] = (False, False)
 ) -> np.ndarray:
-    """Values (ny, nx) at cells' centres as (height, width): by cubic B-splines, smooth and within range."""
+    """Values (ny, nx) at cells' centres as (height, width): cubic B-splines, within their range."""
     rows, columns = values.shape
     down, across = _splines(rows, height, periodic[1]), _splines(columns, width, periodic[0])
     return down @ values.astype(np.float32) @ across.T
@@ -47,8 +47,8 @@ def composite_densities(
 ) -> Picture:
     """The picture with densities (ny, nx) over it, in linear light, in their order.
 
-    Ink multiplies the picture by color^rho. Smoke covers it with its colour by 1 - exp(-rho), where it is
-    transparent too. Negative densities are none.
+    Ink multiplies the picture by color^rho. Smoke has the opacity 1 - exp(-rho), over transparent
+    pixels too. Negative densities count as 0.
     """
     pixels = picture.pixels
     for density, rho in zip(densities, values, strict=True):
@@ -56,7 +56,7 @@ def composite_densities(
             continue
         amount = upsample(np.maximum(rho, 0.0), picture.width, picture.height, periodic)
         pixels = pixels.copy() if pixels is picture.pixels else pixels
-        colours = [channel for channel in range(pixels.shape[2]) if channel != picture.alpha][:3]
+        colours = picture.color_channels[:3]
         color = density.color if len(colours) == 3 else [sum(density.color) / 3] * len(colours)
         if density.look == "ink":
             for channel, value in zip(colours, color, strict=True):

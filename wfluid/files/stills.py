@@ -1,4 +1,4 @@
-"""Numbered stills."""
+"""Animations as numbered stills."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import write_picture
 
 
-class Sequence:
-    """Numbered stills."""
+class StillsWriter:
+    """A still for each frame; `pattern` in the name stands for its number, the first of which is `start`."""
 
     def __init__(self, path: Path, pattern: str, start: int, encoding: Encoding):
         self.path, self.pattern, self.next, self.encoding = path, pattern, start, encoding
         self.written: list[Path] = []
 
     def write(self, picture: Picture) -> None:
-        """Write the next number."""
+        """Write the still with the next number."""
         path = numbered(self.path, self.pattern, self.next)
         write_picture(path, picture, self.encoding)
         self.written.append(path)
         self.next += 1
 
     def close(self) -> None:
-        """Nothing is left to do."""
+        """Every still is finished already."""
 
     def abandon(self) -> None:
-        """Finished files stay."""
+        """Stills that are finished stay."""
