@@ -51,6 +51,7 @@ from wfluid import (
     Picture,
     PictureError,
     PictureMisfit,
+    Run,
     Scene,
     SceneError,
     Seam,
@@ -152,6 +153,7 @@ def run(picture: Picture, solver: Solver, lookup: LookUp, seam: Seam, drawing: D
         assert_type(frame.solve, SolveReport | None)
     shot = Animation(picture, Fluid(), [], Timeline(1.0))
     assert_type(write_animation("a.gif", shot.frames()), list[FilePath])
+    assert_type(shot.frames(), Run[Frame])
     made = morph(picture, picture, [((0.4, 0.3), (0.3, 0.3))])
     assert_type(made, Morph)
     assert_type(made.match, Match)
