@@ -3,7 +3,7 @@
 `assert_type` fails on Any, so a name without a type fails.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 from typing import Any, assert_type
 
@@ -143,7 +143,7 @@ def optimised(picture: Picture, array: np.ndarray, animation: Animation) -> None
 def run(picture: Picture, solver: Solver, lookup: LookUp, seam: Seam, drawing: Drawing, setup: Setup) -> None:
     """Animations, morphs and the solver."""
     frames = animate(picture, Fluid(), [], duration=1.0, fps=12.0, cells=96)
-    assert_type(frames, Iterator[Frame])
+    assert_type(frames, Run[Frame])
     for frame in frames:
         assert_type(frame.picture, Picture)
         assert_type(frame.map, CoordinateMap)
