@@ -1,9 +1,11 @@
 """wfluid: animate, warp and morph pictures by treating them as a fluid.
 
-    from wfluid import Fluid, GaussianForce, Oscillator, animate, read_picture, write_animation
-    picture = read_picture("raccoon.jpg")
-    nose = GaussianForce((0.61, 0.44), (1.5, 1.0), 0.06, Oscillator(period=1.0))
-    write_animation("nose.gif", animate(picture, Fluid(viscosity=0.001), [nose], duration=2), fps=24)
+>>> from wfluid import Fluid, GaussianForce, Oscillator, animate, read_picture, write_animation
+>>> picture = read_picture("examples/images/raccoon.jpg")
+>>> nose = GaussianForce((0.61, 0.44), (1.5, 1.0), 0.06, Oscillator(period=1.0))
+>>> frames = animate(picture, Fluid(viscosity=0.001), [nose], duration=0.25, cells=64, width=160)
+>>> write_animation("nose.gif", frames, fps=24)
+[PosixPath('nose.gif')]
 
 One unit of length is the picture's longer side, one unit of time a second; x points right, y down.
 """

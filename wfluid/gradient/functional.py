@@ -1,10 +1,15 @@
 """An objective as a function of the numbers that are free, with its exact gradient: all an optimiser sees.
 
-    forces = [GaussianForce((0.4, 0.5), (1.0, 0.0), 0.1, Constant(0, 0.5))]
-    objective = ParticleMisfit([(0.4, 0.5)], [(0.6, 0.5)], time=1.0) + 1e-4 * Effort()
-    free = [Free("forces[0].vector"), Free("forces[0].center", scale=0.1)]
-    functional = Functional(grid, fluid, forces, Timeline(1.0), objective, free)
-    value, gradient = functional.value_and_gradient(functional.start)
+>>> from wfluid import Constant, Effort, Fluid, Free, GaussianForce, Grid, ParticleMisfit, Timeline
+>>> forces = [GaussianForce((0.4, 0.5), (1.0, 0.0), 0.1, Constant(0, 0.25))]
+>>> objective = ParticleMisfit([(0.4, 0.5)], [(0.6, 0.5)], time=0.5) + 1e-4 * Effort()
+>>> free = [Free("forces[0].vector"), Free("forces[0].center", scale=0.1)]
+>>> functional = Functional(Grid(32, 32), Fluid(), forces, Timeline(0.5), objective, free)
+>>> value, gradient = functional.value_and_gradient(functional.start)
+>>> gradient.shape
+(4,)
+>>> bool(gradient[0] < 0)  # a stronger push to the right brings the point nearer
+True
 
 The gradient is that of the very numbers the simulation computes, discretisation, walls and all, by the
 adjoint method (Bonilla & Velho, section III): whatever the number of free numbers, it costs about two

@@ -1,6 +1,8 @@
 """What is to be made small: misfits of particles, of the map, of densities; effort; sums; a user's own.
 
-    objective = ParticleMisfit(points, destinations, time=1.0) + 1e-4 * Effort()
+>>> objective = ParticleMisfit([(0.4, 0.5)], [(0.6, 0.5)], time=1.0) + 1e-4 * Effort()
+>>> [weight for weight, _ in objective.terms]
+[1.0, 0.0001]
 
 Each is a frozen description; `functional` brings it to the device. Misfits are halves of weighted squares:
 their gradients are the weighted misfits themselves.

@@ -160,15 +160,13 @@ class _FieldMisfit(DeviceObjective):
 class WarpObjective(StateObjective):
     """An objective in Warp: kernels of one's own, which Warp differentiates.
 
-    @wp.kernel
-    def spread(x: wp.array[float], y: wp.array[float], value: wp.array[float]):
-        n = wp.tid()
-        wp.atomic_add(value, 0, x[n] * x[n] + y[n] * y[n])
-
-    def launch(state, value):
-            wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
-
-        WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
+    >>> @wp.kernel
+    ... def spread(x: wp.array[float], y: wp.array[float], value: wp.array[float]):
+    ...     n = wp.tid()
+    ...     wp.atomic_add(value, 0, x[n] * x[n] + y[n] * y[n])
+    >>> def launch(state, value):
+    ...     wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
+    >>> objective = WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
 
     The program is called once, and what it launches captured and repeated: it must do nothing but launch.
     Fields have ghosts, and rows padded to whole spans: the cell in column i of row j is entry

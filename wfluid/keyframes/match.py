@@ -1,8 +1,14 @@
 """Particle keyframes: forces are found that take points of a picture where they should be, in time.
 
-    animation = Animation(picture, Fluid(viscosity=0.005), [], Timeline(1.0, fps=24, substeps=2))
-    match = match_keyframes(animation, [ParticleKeyframe((0.4, 0.5), (0.5, 0.4), time=1.0)])
-    write_animation("nose.gif", match.animation.frames(), fps=24)
+>>> from wfluid import Fluid, read_picture, write_animation
+>>> picture = read_picture("examples/images/cat.png")
+>>> timeline = Timeline(0.5, fps=12, substeps=4)
+>>> animation = Animation(picture, Fluid(viscosity=0.005), [], timeline, cells=32, width=48)
+>>> match = match_keyframes(animation, [ParticleKeyframe((0.4, 0.5), (0.45, 0.45), time=0.5)])
+>>> match.status
+'reached'
+>>> write_animation("nose.gif", match.animation.frames(), fps=12)
+[PosixPath('nose.gif')]
 
 The paper's third technique (Bonilla & Velho, section III): u holds the strengths, directions and places of
 Gaussian forces; phi(u), half the squares of the misfits, is minimised by L-BFGS with the adjoint's gradient.

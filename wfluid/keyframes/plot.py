@@ -1,7 +1,6 @@
 """A figure of a match: the arrows on the picture, the grid that they deform, the way down.
 
-    match = match_keyframes(animation, keyframes)
-    plot_match(match, "match.png")
+`plot_match(match, "match.png")` writes the figure of what `match_keyframes` found.
 
 The first panel is figure 3 of the paper (Bonilla & Velho): where points were, should be and came.
 """

@@ -1,8 +1,11 @@
 """Morphs: one picture flows into another, through points of both (Bonilla & Velho, figure 7).
 
-    points = [((0.38, 0.25), (0.34, 0.34)), ((0.7, 0.3), (0.58, 0.39))]
-    morph_of_two = morph(read_picture("cat.png"), read_picture("raccoon.png"), points, duration=2.0)
-    write_animation("morph.gif", morph_of_two.frames(), fps=24)
+>>> from wfluid import read_picture, write_animation
+>>> cat, raccoon = (read_picture(f"examples/images/{name}.png") for name in ("cat", "raccoon_face"))
+>>> points = [((0.38, 0.25), (0.34, 0.34)), ((0.7, 0.3), (0.58, 0.39))]
+>>> morph_of_two = morph(cat, raccoon, points, duration=0.5, fps=12, cells=32, width=48)
+>>> write_animation("morph.gif", morph_of_two.frames(), fps=12)
+[PosixPath('morph.gif')]
 
 Keyframes take the points of the first picture a to those of the second, b, within the time of one flow. After
 a part of that time the first is seen through the flow's map to its start, the second through the map to its

@@ -1,7 +1,10 @@
 """Minimise a smooth function of many numbers by limited-memory BFGS.
 
-    found = minimise(value_and_gradient, start, Settings(gradient_tolerance=1e-5))
-    found.x, found.value, found.status
+>>> def value_and_gradient(x):
+...     return float(np.sum((x - 3) ** 4)), 4 * (x - 3) ** 3
+>>> found = minimise(value_and_gradient, np.zeros(2), Settings(gradient_tolerance=1e-5))
+>>> found.x.round(1), found.status.name
+(array([3., 3.]), 'CONVERGED')
 
 Each iteration goes along -H g, where H is BFGS's approximation of the inverse Hessian made of the last few
 steps s and differences y of the gradient g, as far as `line_search` says (J. Nocedal, S. J. Wright, Numerical

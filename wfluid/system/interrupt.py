@@ -10,9 +10,9 @@ from types import FrameType, TracebackType
 class HeldInterrupt:
     """Holds a Ctrl-C back until `check` is asked; a second one stops at once.
 
-    with HeldInterrupt() as interrupt:
-        for frame in frames:
-            interrupt.check()
+    >>> with HeldInterrupt() as interrupt:
+    ...     for frame in range(3):
+    ...         interrupt.check()
 
     Python raises KeyboardInterrupt wherever it is, and forgets it where that is a destructor, of which there
     are many while arrays of the device come and go; or it leaves a library half way. Only the main thread is
