@@ -14,8 +14,6 @@ from wfluid import Morph, Timeline, match_keyframes, read_scene
 from wfluid.morphing.settings import MorphSettings
 from wfluid.staging.build import stage_all
 
-pytestmark = pytest.mark.beside
-
 ROOT = Path(__file__).parents[1]
 
 SCENES, SEARCHED = ROOT / "examples" / "scenes", ("keyframes", "morph")
@@ -84,6 +82,7 @@ def test_the_keyframe_paths_check_holds(device):
         example.check(match)
 
 
+@pytest.mark.long
 def test_every_scene_shows_its_control(device):
     """Each moves and does not fold; areas change by what the growth says and by nothing else."""
     example = load("scene_sheet")
@@ -139,6 +138,7 @@ def test_any_picture_moves(device):
     assert example.check(list(example.frames(example.CAT, cells=48, device=device.alias))) > 0.005
 
 
+@pytest.mark.long
 def test_examples_refuse_unknown_options(tmp_path):
     for path in (ROOT / "examples").glob("*.py"):
         result = subprocess.run(
@@ -148,6 +148,7 @@ def test_examples_refuse_unknown_options(tmp_path):
         assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["oscillator", "viscosity", "variable_viscosity", "any_picture", "scene_sheet"]
 )

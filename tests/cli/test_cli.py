@@ -1,4 +1,4 @@
-"""The command as people run it: in a process of its own."""
+"""The command: what it writes, what it refuses."""
 
 import json
 import subprocess
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from command import wfluid, wfluid_process
 
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import write_picture
@@ -17,11 +18,6 @@ REPORT = {
     "picture", "grid", "frames", "fps", "steps", "seconds", "divergence_max", "jacobian_min", "jacobian_max",
     "displacement_max_px", "displacement_mean_px", "outside_fraction", "versions", "device",
 }  # fmt: skip
-
-
-def wfluid(*arguments, cwd=None, timeout=120):
-    command = [sys.executable, "-m", "wfluid", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=timeout)
 
 
 @pytest.fixture
@@ -36,13 +32,15 @@ def small(tmp_path):
     return path
 
 
-def animate(small, out, *more):
-    return wfluid("animate", small, "-o", out, "--cells", 24, "--duration", 0.4, "--fps", 10, *more)
+def animate(small, out, *more, run=wfluid):
+    return run("animate", small, "-o", out, "--cells", 24, "--duration", 0.4, "--fps", 10, *more)
 
 
 def test_animate_writes_a_gif_and_a_report(small, tmp_path):
     push = ("--push", "30,20:5,0:radius=8")
-    result = animate(small, tmp_path / "a.gif", *push, "--report", tmp_path / "r.json", "--quiet")
+    result = animate(
+        small, tmp_path / "a.gif", *push, "--report", tmp_path / "r.json", "--quiet", run=wfluid_process
+    )
     assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
     report = json.loads((tmp_path / "r.json").read_text())
     assert report.keys() >= REPORT
@@ -68,7 +66,8 @@ def test_the_first_frame_of_a_sequence_is_the_picture_itself(small, tmp_path):
 
 def test_the_same_command_twice_gives_the_same_bytes(small, tmp_path):
     for name in ("a", "b"):
-        assert animate(small, tmp_path / f"{name}.gif", "--push", "30,20:5,2:period=0.4").returncode == 0
+        push = ("--push", "30,20:5,2:period=0.4")
+        assert animate(small, tmp_path / f"{name}.gif", *push, run=wfluid_process).returncode == 0
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
 
 
@@ -122,4 +121,4 @@ def test_help_loads_neither_warp_nor_openimageio():
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert result.stdout.strip() == "[]"
-    assert wfluid("--help").returncode == 0
+    assert wfluid_process("--help").returncode == 0

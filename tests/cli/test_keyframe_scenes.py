@@ -21,8 +21,6 @@ from wfluid.scene.schema import SceneError
 from wfluid.scene.toml_file import read_scene, write_scene
 from wfluid.staging.build import stage_all
 
-pytestmark = pytest.mark.beside
-
 MOVE = {"from": [20, 20], "to": [26, 16]}
 FOUND = {"center": [21, 19], "vector": [90, -60], "radius": 6, "start": 0, "end": 0.25}
 QUICK = ("--cells", "16", "--time", "0.25", "--fps", "12", "--quiet")

@@ -19,8 +19,6 @@ from wfluid.scene.schema import SceneError
 from wfluid.scene.toml_file import read_scene
 from wfluid.staging.build import stage_all
 
-pytestmark = pytest.mark.beside
-
 MOVES = {"move": [{"from": [20, 20], "to": [26, 16]}]}
 TALL = {"to": "tall.png"}
 """The other picture is 40 x 60 pixels where the first is 60 x 40."""

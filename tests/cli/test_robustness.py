@@ -12,6 +12,7 @@ import zlib
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from command import wfluid, wfluid_process
 
 from wfluid.pictures import stills
 from wfluid.pictures.formats import PictureError
@@ -20,12 +21,8 @@ from wfluid.pictures.stills import read_picture, write_picture
 from wfluid.system.atomic import remove_leftovers
 
 PUSH = ("--push", "30,20:5,0:radius=8")
+LONG = pytest.mark.long
 QUICK = ("--cells", "16", "--duration", "0.2", "--fps", "10", "--quiet")
-
-
-def wfluid(*arguments, **settings):
-    command = [sys.executable, "-m", "wfluid", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, **settings)
 
 
 @pytest.fixture
@@ -83,7 +80,7 @@ def test_bad_pictures_are_refused_by_the_command(tmp_path, name):
     (tmp_path / "out").mkdir()
     if content is not None:
         (tmp_path / name).write_bytes(content(tmp_path))
-    result = wfluid("animate", tmp_path / name, "-o", tmp_path / "out" / "a.gif", *PUSH, *QUICK)
+    result = wfluid_process("animate", tmp_path / name, "-o", tmp_path / "out" / "a.gif", *PUSH, *QUICK)
     refused(result, says, tmp_path / "out")
     assert name in result.stderr
 
@@ -216,13 +213,13 @@ def test_a_full_disk_leaves_nothing(small, tmp_path, name):
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
 
     options = (*PUSH, "--cells", "16", "--duration", "0.2", "--fps", "10", "--quiet")
-    result = wfluid("animate", small, "-o", tmp_path / "out" / name, *options, preexec_fn=limit)
+    result = wfluid_process("animate", small, "-o", tmp_path / "out" / name, *options, preexec_fn=limit)
     assert result.returncode in (1, 2), (result.returncode, result.stderr)
     assert "Traceback" not in result.stderr and "a" in result.stderr
     assert list((tmp_path / "out").iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["a.####.png", "a.gif", "a.mp4"])
+@pytest.mark.parametrize("name", ["a.####.png", *(pytest.param(n, marks=LONG) for n in ("a.gif", "a.mp4"))])
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
 def test_a_stopped_run_leaves_whole_files_only(small, tmp_path, name, how):
     """Killed or interrupted in the middle: every file under its name can be read to its end."""
@@ -351,7 +348,7 @@ def test_a_gif_too_long_for_the_memory_is_refused(small, tmp_path):
 
 
 def test_version_names_what_it_runs_on():
-    result = wfluid("--version")
+    result = wfluid_process("--version")
     assert result.returncode == 0
     for name in ("wfluid ", "warp 1.", "OpenImageIO 3.", "devices: cpu"):
         assert name in result.stdout

@@ -21,7 +21,15 @@ from wfluid.keyframes.keyframes import TOLERANCE, targets_of
 from wfluid.keyframes.match import REACHED, STOPPED, UNREACHABLE
 from wfluid.keyframes.ways import plan_ways
 
-pytestmark = pytest.mark.beside
+LONG = {"twenty at random", "pins around", "a long scene", "a stiff disc that moves", "crossing"}
+"""Cases whose search takes several seconds."""
+
+
+def cases(names):
+    """A test for each case; those of `LONG` are marked long."""
+    marked = [pytest.param(name, marks=[pytest.mark.long] if name in LONG else []) for name in names]
+    return pytest.mark.parametrize("name", marked)
+
 
 GOOD = 0.25
 """Residual that is good enough [px]."""
@@ -51,7 +59,7 @@ def steps_of(match):
     return [round(arrival.keyframe.time / dt) for arrival in match.arrivals]
 
 
-@pytest.mark.parametrize("name", CASES)
+@cases(CASES)
 def test_keyframes_are_reached_without_a_fold(match_of, name):
     """Every particle at its destination, every destination showing its point; det J > 0 in all frames."""
     case, match = CASES[name], match_of(name)
@@ -139,7 +147,7 @@ def velocity_at(state, places):
     )
 
 
-@pytest.mark.parametrize("name", ["one arrow", "crossing", "a third of the picture", "no-slip"])
+@cases(["one arrow", "crossing", "a third of the picture", "no-slip"])
 def test_particles_traced_by_another_hand_arrive(match_of, device_name, name):
     """dx/dt = v(x, t): classical Runge-Kutta steps through the solver's fields, each kept for a step."""
     match = match_of(name)
@@ -163,7 +171,7 @@ def test_particles_traced_by_another_hand_arrive(match_of, device_name, name):
     assert missed.max() <= 0.5, np.round(missed, 3)
 
 
-@pytest.mark.parametrize("name", ["pins around", "a path, one pinned"])
+@cases(["pins around", "a path, one pinned"])
 def test_pins_stay_where_they_are_all_the_time(match_of, name):
     """Within 1.5 px at every step until the last keyframe, not at keyframes only."""
     match = match_of(name)
@@ -236,6 +244,7 @@ def test_a_search_that_starts_at_its_end_stays_there(match_of, device_name):
     np.testing.assert_allclose(numbers_of(match), numbers_of(before), rtol=0, atol=0.02)
 
 
+@pytest.mark.long
 def test_a_long_scene_is_searched_span_by_span(match_of):
     """Its windows are cut at keyframes; a span's forces act in it, those of another begin where it ends."""
     match = match_of("a long scene")

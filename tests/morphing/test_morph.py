@@ -28,8 +28,6 @@ from wfluid.morphing.morph import LEAST_JACOBIAN, TOLERANCE
 from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.picture import resample
 
-pytestmark = pytest.mark.beside
-
 CASES = ("dots", "shift", "turn")
 
 SPLIT = np.repeat((np.arange(120) < 60)[None, :], 80, axis=0).astype(float)
