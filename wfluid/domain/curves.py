@@ -46,7 +46,7 @@ class Curve:
         """Its value after parts of the time, of their shape."""
         times, values = (np.array(column, dtype=np.float64) for column in zip(*self.keys, strict=True))
         if not self.eased:
-            return np.interp(part, times, values)
+            return np.interp(np.asarray(part), times, values)
         numbers = np.arange(len(times))
         at = np.interp(part, times, numbers)  # the key before, and the part of the way to the next
         before = np.floor(at)
