@@ -21,7 +21,14 @@ from wfluid.keyframes.keyframes import TOLERANCE, targets_of
 from wfluid.keyframes.match import REACHED, STOPPED, UNREACHABLE
 from wfluid.keyframes.ways import plan_ways
 
-LONG = {"twenty at random", "pins around", "a long scene", "a stiff disc that moves", "crossing"}
+LONG = {
+    "twenty at random",
+    "pins around",
+    "a long scene",
+    "a stiff disc",
+    "a stiff disc that moves",
+    "crossing",
+}
 """Cases whose search takes several seconds."""
 
 
@@ -209,6 +216,7 @@ def numbers_of(match):
     return np.array([[*force.vector, *force.center, force.radius] for force in match.found]).ravel()
 
 
+@pytest.mark.long
 def test_points_pass_one_another_on_the_side_that_the_seed_chooses(device_name):
     """A swap, stopped when the march is through: turned round by another seed, both points to their side."""
     swap, sides = replace(CASES["a swap"], cells=48, duration=0.5), {}
