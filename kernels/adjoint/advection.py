@@ -17,7 +17,8 @@ from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import gather, inside
 from wfluid.kernels.cell.program import adjoint_cells
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
-from wfluid.kernels.step.advection import mean, velocity_centre
+from wfluid.kernels.step.advection import velocity_c
+from wfluid.kernels.step.differences import mean_f
 from wfluid.kernels.step.interpolation import bilinear, cubic_slopes, cubic_weights, kept_inside, locate
 
 
@@ -47,8 +48,8 @@ def place_feet(
 ):
     """The point before the foot of face k, and the fractions past it; of centre k with `before` = 0."""
     k = inside(k)
-    column, fraction_x = locate(i, mean(foot_x, k, before), nx, periodic_x)
-    row, fraction_y = locate(j, mean(foot_y, k, before), ny, periodic_y)
+    column, fraction_x = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
+    row, fraction_y = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
     at[k] = index(column, row, pitch)
     tx[k] = fraction_x
     ty[k] = fraction_y
@@ -174,7 +175,7 @@ def trace_euler_adjoint(
 ):
     """The transpose of `trace_euler`, but for the means of faces."""
     k = inside(k)
-    u_centre, v_centre = velocity_centre(u, v, k, pitch)
+    u_centre, v_centre = velocity_c(u, v, k, pitch)
     u_centre_bar[k] = -dt_hx * foot_x_bar[k] * moves_inside(-dt_hx * u_centre, i, nx, periodic_x)
     v_centre_bar[k] = -dt_hy * foot_y_bar[k] * moves_inside(-dt_hy * v_centre, j, ny, periodic_y)
 
@@ -207,7 +208,7 @@ def place_middles(
     """
     k = inside(k)
     half = Real(0.5)
-    u_centre, v_centre = velocity_centre(u, v, k, pitch)
+    u_centre, v_centre = velocity_c(u, v, k, pitch)
     x = kept_inside(-half * dt_hx * u_centre, i, nx, periodic_x)
     y = kept_inside(-half * dt_hy * v_centre, j, ny, periodic_y)
     column, tx = locate(i, x, nx, periodic_x)
@@ -256,7 +257,7 @@ def trace_midpoint_adjoint(
     """
     k = inside(k)
     half = Real(0.5)
-    u_centre, v_centre = velocity_centre(u, v, k, pitch)
+    u_centre, v_centre = velocity_c(u, v, k, pitch)
     u_middle = bilinear(u, u_at[k], pitch, u_tx[k], u_ty[k])
     v_middle = bilinear(v, v_at[k], pitch, v_tx[k], v_ty[k])
     u_bar = -dt_hx * foot_x_bar[k] * moves_inside(-dt_hx * u_middle, i, nx, periodic_x)
@@ -286,9 +287,9 @@ def add_face_means(
     # outputs
     f_bar: Field,
 ):
-    """The transpose of `velocity_centre` for one component: face k is half of the centre on either side.
+    """The transpose of `velocity_c` for one component: face k is half of the centre on either side.
 
     Ghosts, which the last span of a row runs into, keep what they are to be folded with.
     """
     k = inside(k)
-    f_bar[k] = f_bar[k] + wp.where(i < nx, mean(centre_bar, k, before), Real(0.0))
+    f_bar[k] = f_bar[k] + wp.where(i < nx, mean_f(centre_bar, k, before), Real(0.0))

@@ -15,6 +15,7 @@ from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
 from wfluid.kernels.solve.sums import LANES, Lane, total_of_lanes
+from wfluid.kernels.step.differences import mean_f
 from wfluid.kernels.step.forces import in_profile
 
 ORDERS = wp.constant(5)
@@ -134,7 +135,7 @@ def mean_with_before(
 ):
     """What `lift` multiplies by its impulse: the mean on both sides of face k."""
     k = inside(k)
-    out[k] = Real(0.5) * (rho[k] + rho[inside(k - before)])
+    out[k] = mean_f(rho, k, before)
 
 
 @adjoint_cells
@@ -150,7 +151,7 @@ def weighted(
 ):
     """The transpose of `push_weighted` with respect to what is weighted; of `weigh` with `before` = 0."""
     k = inside(k)
-    out[k] = Real(0.5) * (weight[k] + weight[inside(k - before)]) * f_bar[k]
+    out[k] = mean_f(weight, k, before) * f_bar[k]
 
 
 @adjoint_cells

@@ -29,7 +29,7 @@ def scale(
     # outputs
     out: Field,
 ):
-    """out = factor f."""
+    """out = factor f, which may be f itself."""
     k = inside(k)
     out[k] = factor * f[k]
 

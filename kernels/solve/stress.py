@@ -25,16 +25,11 @@ import warp as wp
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
+from wfluid.kernels.step.differences import mean_f
 
 
 @wp.func
-def at_face(c: Field, k: int, along: int):
-    """Mean of c on both sides of face k."""
-    return Real(0.5) * (c[k] + c[inside(k - along)])
-
-
-@wp.func
-def at_node(c: Field, k: int, along: int, across: int):
+def mean_n(c: Field, k: int, along: int, across: int):
     """Mean of c around the node where face k begins."""
     behind = inside(k - along)
     before = inside(k - across)
@@ -43,7 +38,7 @@ def at_node(c: Field, k: int, along: int, across: int):
 
 
 @wp.func
-def stress_divergence(
+def stress_divergence_f(
     f: Field, g: Field, mu: Field, k: int, along: int, across: int, normal: Real, shear: Real, cross: Real
 ):
     """dt div (mu (grad v + grad v^T)) on face k.
@@ -54,8 +49,8 @@ def stress_divergence(
     behind = inside(k - along)
     before = inside(k - across)
     after = inside(k + across)
-    mu_before = at_node(mu, k, along, across)
-    mu_after = at_node(mu, after, along, across)
+    mu_before = mean_n(mu, k, along, across)
+    mu_after = mean_n(mu, after, along, across)
     compression = mu[k] * (f[ahead] - f[k]) - mu[behind] * (f[k] - f[behind])
     sliding = mu_after * (f[after] - f[k]) - mu_before * (f[k] - f[before])
     turning = mu_after * (g[after] - g[inside(after - along)]) - mu_before * (g[k] - g[behind])
@@ -63,13 +58,13 @@ def stress_divergence(
 
 
 @wp.func
-def row_sum(
+def row_sum_f(
     mu: Field, alpha: Field, k: int, along: int, across: int, dt: Real, normal: Real, shear: Real, cross: Real
 ):
     """Sum of |A| over the row of face k."""
     mu_normal = mu[k] + mu[inside(k - along)]
-    mu_shear = at_node(mu, k, along, across) + at_node(mu, inside(k + across), along, across)
-    drag = Real(1.0) + dt * at_face(alpha, k, along)
+    mu_shear = mean_n(mu, k, along, across) + mean_n(mu, inside(k + across), along, across)
+    drag = Real(1.0) + dt * mean_f(alpha, k, along)
     return drag + Real(2.0) * (normal * mu_normal + (shear + cross) * mu_shear)
 
 
@@ -94,8 +89,8 @@ def residual(
 ):
     """What is left of one component: r = b - A v."""
     k = inside(k)
-    drag = Real(1.0) + dt * at_face(alpha, k, along)
-    r[k] = b[k] - drag * f[k] + stress_divergence(f, g, mu, k, along, across, normal, shear, cross)
+    drag = Real(1.0) + dt * mean_f(alpha, k, along)
+    r[k] = b[k] - drag * f[k] + stress_divergence_f(f, g, mu, k, along, across, normal, shear, cross)
 
 
 @cells
@@ -116,7 +111,7 @@ def weight(
 ):
     """1 / the row sum of |A| of one component."""
     k = inside(k)
-    out[k] = Real(1.0) / row_sum(mu, alpha, k, along, across, dt, normal, shear, cross)
+    out[k] = Real(1.0) / row_sum_f(mu, alpha, k, along, across, dt, normal, shear, cross)
 
 
 @cells
@@ -142,8 +137,8 @@ def sweep(
 ):
     """One damped sweep of one component: out = f + rate weight (b - A v)."""
     k = inside(k)
-    drag = Real(1.0) + dt * at_face(alpha, k, along)
-    left = b[k] - drag * f[k] + stress_divergence(f, g, mu, k, along, across, normal, shear, cross)
+    drag = Real(1.0) + dt * mean_f(alpha, k, along)
+    left = b[k] - drag * f[k] + stress_divergence_f(f, g, mu, k, along, across, normal, shear, cross)
     out[k] = f[k] + rate * weights[k] * left
 
 
@@ -176,4 +171,4 @@ def drag_factor(
 ):
     """beta = 1 / (1 + dt alpha) on face k: what drag alone leaves of a velocity."""
     k = inside(k)
-    beta[k] = Real(1.0) / (Real(1.0) + dt * at_face(alpha, k, along))
+    beta[k] = Real(1.0) / (Real(1.0) + dt * mean_f(alpha, k, along))

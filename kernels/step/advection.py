@@ -20,11 +20,12 @@ from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
+from wfluid.kernels.step.differences import mean_f
 from wfluid.kernels.step.interpolation import bilinear, cubic, kept_inside, locate
 
 
 @wp.func
-def velocity_centre(u: Field, v: Field, k: int, pitch: int):
+def velocity_c(u: Field, v: Field, k: int, pitch: int):
     """Velocity at centre k, from the faces around it."""
     south = inside(k + pitch)
     return Real(0.5) * (u[k] + u[k + 1]), Real(0.5) * (v[k] + v[south])
@@ -50,7 +51,7 @@ def trace_euler(
 ):
     """Offset [cells] from centre k to its foot, Euler: -dt v(x)."""
     k = inside(k)
-    u_centre, v_centre = velocity_centre(u, v, k, pitch)
+    u_centre, v_centre = velocity_c(u, v, k, pitch)
     foot_x[k] = kept_inside(-dt_hx * u_centre, i, nx, periodic_x)
     foot_y[k] = kept_inside(-dt_hy * v_centre, j, ny, periodic_y)
 
@@ -76,7 +77,7 @@ def trace_midpoint(
     """Offset [cells] from centre k to its foot, midpoint rule: -dt v(x - dt/2 v(x))."""
     k = inside(k)
     half = Real(0.5)
-    u_centre, v_centre = velocity_centre(u, v, k, pitch)
+    u_centre, v_centre = velocity_c(u, v, k, pitch)
     x = kept_inside(-half * dt_hx * u_centre, i, nx, periodic_x)
     y = kept_inside(-half * dt_hy * v_centre, j, ny, periodic_y)
     column, tx = locate(i, x, nx, periodic_x)
@@ -87,13 +88,6 @@ def trace_midpoint(
     v_middle = bilinear(v, index(column, face_row, pitch), pitch, tx, face_ty)
     foot_x[k] = kept_inside(-dt_hx * u_middle, i, nx, periodic_x)
     foot_y[k] = kept_inside(-dt_hy * v_middle, j, ny, periodic_y)
-
-
-@wp.func
-def mean(f: Field, k: int, before: int):
-    """Of f at k and at the neighbour `before` elements earlier."""
-    other = inside(k - before)
-    return Real(0.5) * (f[other] + f[k])
 
 
 @cells
@@ -115,8 +109,8 @@ def advect_face_cubic(
 ):
     """A face component at its foot, cubic; `before` = 1 on x-faces, `pitch` on y-faces."""
     k = inside(k)
-    column, tx = locate(i, mean(foot_x, k, before), nx, periodic_x)
-    row, ty = locate(j, mean(foot_y, k, before), ny, periodic_y)
+    column, tx = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
+    row, ty = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
     out[k] = cubic(f, index(column, row, pitch), pitch, tx, ty)
 
 
@@ -139,6 +133,6 @@ def advect_face_bilinear(
 ):
     """A face component at its foot, bilinear; `before` = 1 on x-faces, `pitch` on y-faces."""
     k = inside(k)
-    column, tx = locate(i, mean(foot_x, k, before), nx, periodic_x)
-    row, ty = locate(j, mean(foot_y, k, before), ny, periodic_y)
+    column, tx = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
+    row, ty = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
     out[k] = bilinear(f, index(column, row, pitch), pitch, tx, ty)

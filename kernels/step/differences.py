@@ -1,7 +1,8 @@
-"""Differences of neighbours on the staggered grid: gradient G, divergence D and Laplacian L = D G, each once.
+"""Differences and means of neighbours on the staggered grid: gradient G, divergence D, L = D G, each once.
 
 A suffix says where the value lives: `_x` on the x-face k, between centres k - 1 and k; `_y` on the y-face k,
-between k - pitch and k; `_c` at the centre k. Of values on faces `gradient_x` and `gradient_y` lie half a
+between k - pitch and k; `_f` on either of them, by its stride `before` = 1 or pitch; `_c` at the centre k;
+`_n` at the node where cell k begins. Of values on faces `gradient_x` and `gradient_y` lie half a
 cell on: at the centre before k along the difference, or at the node where cell k begins across it. Second
 order. Walls are in the ghosts, so that G = -D^T.
 
@@ -14,8 +15,14 @@ from wfluid.kernels.cell.real import Field, Real
 
 
 @wp.func
-def slope(q: Field, k: int, before: int, over_h: Real):
-    """dq/ds halfway between entries k - `before` and k."""
+def mean_f(c: Field, k: int, before: int):
+    """Mean of a value at centres, on face k; of one on faces, at the centre."""
+    return Real(0.5) * (c[inside(k - before)] + c[k])
+
+
+@wp.func
+def slope_f(q: Field, k: int, before: int, over_h: Real):
+    """dq/ds on face k."""
     return over_h * (q[k] - q[inside(k - before)])
 
 
@@ -28,7 +35,7 @@ def gradient_x(q: Field, k: int, over_hx: Real):
 @wp.func
 def gradient_y(q: Field, k: int, pitch: int, over_hy: Real):
     """dq/dy on y-face k."""
-    return slope(q, k, pitch, over_hy)
+    return slope_f(q, k, pitch, over_hy)
 
 
 @wp.func

@@ -21,6 +21,7 @@ from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, RowReal, Uniform
+from wfluid.kernels.step.differences import mean_f
 
 CUT = wp.constant(Real({"float32": 6.0, "float64": 9.0}[Real.__name__]))
 """Radii after which exp(-r^2/2) is below the rounding of one."""
@@ -106,7 +107,7 @@ def lift(
 ):
     """Add a density's buoyancy to one component, in place: impulse times its mean at k and k - `before`."""
     k = inside(k)
-    u[k] = u[k] + impulse * Real(0.5) * (rho[k] + rho[inside(k - before)])
+    u[k] = u[k] + impulse * mean_f(rho, k, before)
 
 
 @cells
@@ -137,4 +138,4 @@ def push_weighted(
 ):
     """Add what forces gained [L/s], times a weight at centres k and k - `before`, in place."""
     k = inside(k)
-    u[k] = u[k] + Real(0.5) * (weight[k] + weight[inside(k - before)]) * gained[k]
+    u[k] = u[k] + mean_f(weight, k, before) * gained[k]

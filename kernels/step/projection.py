@@ -13,7 +13,7 @@ Bridson, 2nd ed., chapter 5.
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Uniform
-from wfluid.kernels.step.differences import divergence_c, gradient_x, gradient_y, slope
+from wfluid.kernels.step.differences import divergence_c, gradient_x, gradient_y, slope_f
 
 
 @cells
@@ -51,7 +51,7 @@ def subtract_slope(
     kept_h = kept / h; `before` = 1 on x-faces, `pitch` on y-faces.
     """
     k = inside(k)
-    out[k] = f[k] - slope(q, k, before, kept_h)
+    out[k] = f[k] - slope_f(q, k, before, kept_h)
 
 
 @cells

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wfluid.domain.curves import DELAY_LIMIT, Curve, curve_of, local
+from wfluid.domain.piecewise import ease, hats, lerp_at
 
 PARTS = np.linspace(0, 1, 41)
 
@@ -110,3 +111,19 @@ def test_grey_is_between():
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
 def test_without_a_delay_a_mask_says_nothing(value):
     np.testing.assert_array_equal(local(PARTS, np.full(PARTS.shape, value), 0.0), PARTS)
+
+
+def test_lines_between_samples_end_at_them():
+    """Constant before the first and after the last; hats are the weights of the same lines."""
+    times, values = (0.5, 1.0, 3.0), (2.0, -1.0, 4.0)
+    for t in (-1.0, 0.5, 0.7, 1.0, 2.9, 3.0, 9.0):
+        assert lerp_at(times, values, t) == pytest.approx(np.interp(t, times, values), abs=1e-15)
+        assert hats(times, t) @ values == pytest.approx(np.interp(t, times, values), abs=1e-15)
+        assert hats(times, t).sum() == pytest.approx(1.0, abs=1e-15)
+    assert lerp_at((1.0,), (5.0,), 0.0) == 5.0
+
+
+def test_a_ramp_is_level_at_both_ends():
+    s = np.array([0.0, 0.5, 1.0])
+    np.testing.assert_array_equal(ease(s), [0.0, 0.5, 1.0])
+    assert ease(1e-4) < 3.1e-8 and 1 - ease(1 - 1e-4) < 3.1e-8

@@ -117,12 +117,13 @@ class Projection:
     def kept_adjoint(self, velocity_bar: Vector, q_bar: wp.array, kept: wp.array, out: wp.array) -> None:
         """The transpose of taking the part `kept` of the last pressure off and adding it again.
 
-        out = kept (q_bar + div velocity_bar); `velocity_bar` with ghosts. `q_bar` is written over.
+        out = kept (q_bar + div velocity_bar); `velocity_bar` with ghosts.
         """
         inputs = [*velocity_bar, *self._inverse_h, self.layout.pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, self._minus_div)
-        algebra.subtract.launch(self.layout, self.device, self._minus_div, [q_bar])
-        algebra.scale.launch(self.layout, self.device, [q_bar, kept], [out])
+        algebra.copy.launch(self.layout, self.device, [q_bar], [out])
+        algebra.subtract.launch(self.layout, self.device, self._minus_div, [out])
+        algebra.scale.launch(self.layout, self.device, [out, kept], [out])
 
     def add_pressure(self, q: wp.array, kept: wp.array, out: wp.array) -> None:
         """out = the impulse of the pressure: the part `kept` of q, taken off before, and the projected."""
