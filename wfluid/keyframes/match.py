@@ -22,7 +22,7 @@ from wfluid.animation.animation import Animation
 from wfluid.domain.grid import Grid
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
-from wfluid.gradient.functional import Functional
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.variables import Free
 from wfluid.keyframes.arrival import Arrival, reason_unreached
 from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, PointTarget, targets_of
@@ -145,9 +145,9 @@ def match_keyframes(
     factors = FACTORS if factors is None else factors
     tries = [(factors[0], tuple(start))] if free or start else []
     tries += [] if free else [(factor, ()) for factor in factors]
-    captured: dict[Grid, Functional] = {}
+    graphs = GraphCache()
     for factor, before in tries:
-        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, captured)
+        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, graphs)
         if (before or _all_stay(particles)) and (
             best := _measured(matcher, False, log, began)
         ).status == REACHED:
@@ -221,10 +221,10 @@ class _Matcher:
         seed: int,
         factor: float,
         log: SearchLog,
-        captured: dict[Grid, Functional],
+        graphs: GraphCache,
     ):
         self.animation, self.particles, self.tolerance = animation, particles, tolerance
-        self._free, self._start, self._log, self._captured = free, start, log, captured
+        self._free, self._start, self._log, self._graphs = free, start, log, graphs
         grid = animation.grid
         self.ways = plan_ways(particles, (grid.width, grid.height), seed)
         self._radii = radii_of(self.ways, factor)
@@ -271,7 +271,7 @@ class _Matcher:
         """Search one span; both levels at its end."""
         animation = self.animation
         scene = Problem(
-            animation.fluid, self.given, self._free, animation.timeline, animation.device, self._captured
+            animation.fluid, self.given, self._free, animation.timeline, animation.device, self._graphs
         )
         span = self._span(edges, coarse, scene)
         search = Search(scene, span, self.tolerance, self._log)

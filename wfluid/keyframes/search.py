@@ -25,9 +25,10 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.state import State
 from wfluid.gradient.functional import EvaluationTimes, Functional
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.objectives import Effort
 from wfluid.gradient.variables import Free
-from wfluid.keyframes.way_misfit import NOTHING, WayMisfit
+from wfluid.keyframes.way_misfit import NOTHING, WayMisfit, longest
 from wfluid.keyframes.ways import Way
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
@@ -131,8 +132,8 @@ class Problem:
     """Its steps."""
     device: str | None
     """Where it is computed."""
-    captured: dict[Grid, Functional]
-    """The last functional on each grid: the next one takes over its graphs, if it can."""
+    graphs: GraphCache
+    """Captured graphs, which one minimisation takes over from the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +166,7 @@ class Search:
         ]
         self._typical_effort = float(np.mean(typical)) if typical else 1.0
         self._weight = WEIGHT
-        self._lures: dict[float, np.ndarray] = {}
+        self._multipliers: dict[float, np.ndarray] = {}
 
     given: tuple[Force, ...]
     """The user's forces."""
@@ -202,15 +203,17 @@ class Search:
         """
         edges, before = self._span.edges, math.inf
         for _ in range(ROUNDS[stage]):
-            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), corrections)
+            worst, misfits = self._minimise(
+                stage, level, (edges[0], edges[-1]), self._all_free(), corrections
+            )
             if worst <= NEAR_ENOUGH * self._tolerance:
                 break
             lower = 1.0 if worst < 0.5 * before else LOWER
             if self._weight * lower < LEAST_WEIGHT:
                 break
             self._weight, before = self._weight * lower, worst
-            for t, by in left.items():
-                self._lures[t] = (self._lures.get(t, 0.0) - by) * lower
+            for t, by in misfits.items():
+                self._multipliers[t] = (self._multipliers.get(t, 0.0) - by) * lower
         return worst
 
     def after(self, level: GridStart, step: int | None = None) -> GridStart:
@@ -241,7 +244,7 @@ class Search:
         self, level: GridStart, last: int, journey: WayMisfit, free: Sequence[Free], weight: float
     ) -> Functional:
         scene, edges = self._scene, self._span.edges
-        functional = Functional(
+        return Functional(
             level.grid,
             scene.fluid,
             (*self.given, *self.forces),
@@ -251,11 +254,9 @@ class Search:
             begin=level.begin,
             end=self._time_of(last),
             device=scene.device,
-            like=scene.captured.get(level.grid),
+            graphs=scene.graphs,
             room=self._time_of(edges[-1]) - self._time_of(edges[0]),
         )
-        scene.captured[level.grid] = functional
-        return functional
 
     def _moments(self, first: int, last: int) -> list[float]:
         """Times of keyframes in a stretch; between them ends and middles of windows."""
@@ -271,30 +272,28 @@ class Search:
         free: Sequence[Free],
         corrections: Mapping[float, np.ndarray] = NOTHING,
     ) -> tuple[float, Mapping[float, np.ndarray]]:
-        """Minimise over what is free, keeping the best; the longest misfit, and all, of keyframes."""
+        """Minimise over the free numbers, keep the best point; the longest and all keyframe misfits."""
         log, span = self._log, self._span
         moments, marches = self._moments(*steps), stage == MARCH
         guided = span.guided if marches else ()
-        multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
+        multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._multipliers, self._weight)
         journey = WayMisfit(span.ways, level.points, moments, self._unit, guided, corrections, multipliers)
         functional = self._functional(level, steps[1], journey, free, weight)
         smooth = Smoothness(self._chains(functional), weight)
-        done, stopped, seen = log.evaluations, False, {}
+        done, stopped = log.evaluations, False
 
-        def evaluate(m: np.ndarray) -> tuple[float, np.ndarray]:
+        def evaluate(m: np.ndarray) -> tuple[float, np.ndarray, Mapping[float, np.ndarray]]:
             try:
-                value, gradient = functional.value_and_gradient(m)
+                found = functional.evaluate(m)
             except ValueError as error:  # a force beyond the limit
                 raise FloatingPointError(str(error)) from error
-            seen[m.tobytes()] = journey.worst, dict(journey.left)
-            return smooth.added(value, gradient, m)
+            return *smooth.added(found.value, found.gradient, m), journey.misfits(found.places)
 
         def heed(at: Iterate) -> bool:
             nonlocal stopped
             log.evaluations = done + at.evaluations
-            progress = Progress(
-                stage, len(log.history) + 1, log.evaluations, at.value, seen[at.x.tobytes()][0]
-            )
+            (misfits,) = at.point.details
+            progress = Progress(stage, len(log.history) + 1, log.evaluations, at.value, longest(misfits))
             log.history.append(progress)
             stopped = bool(log.heed(progress))
             near = not marches and progress.worst <= NEAR[stage] * self._tolerance
@@ -315,7 +314,10 @@ class Search:
         self.given, self.forces = forces[: len(self.given)], forces[len(self.given) :]
         if stopped:
             raise Stopped
-        return seen.get(minimum.x.tobytes(), (math.inf, {}))
+        if not minimum.point.details:
+            return math.inf, {}  # not even the start could be evaluated
+        (misfits,) = minimum.point.details
+        return longest(misfits), misfits
 
     def _chains(self, functional: Functional) -> list[Chain]:
         """The entries of each point's forces that vary, in the order of their windows."""
