@@ -55,8 +55,8 @@ FACTORS = (1.0, 1.4, 0.65)
 NEARLY_FOLDED = 0.1
 """Det J below which other radii are tried."""
 
-SPAN = 0.5
-"""Time between keyframes that is searched at once, if there are so many [s]."""
+SPAN_SECONDS = 0.5
+"""Length of the spans of time that are searched one after the other; they end at keyframes [s]."""
 
 AIMED = 2
 """How often aims are moved for the picture's sake."""
@@ -262,7 +262,7 @@ class _Matcher:
         stops = sorted({round(t / dt) for particle in self.particles for t in particle.times})
         cuts = [0]
         for stop, following in pairwise(stops):
-            if (following - cuts[-1]) * dt > SPAN:
+            if (following - cuts[-1]) * dt > SPAN_SECONDS:
                 cuts.append(stop)
         cuts.append(stops[-1])
         return [[e for e in self._edges if a <= e <= b] for a, b in pairwise(cuts)]
@@ -310,8 +310,8 @@ class _Matcher:
         missing = []
         for n, particle in enumerate(self.particles):
             steps = [round(t / scene.timeline.dt) for t in particle.times]
-            left = np.linalg.norm(tracks[steps, n] - particle.destinations, axis=1)
-            missing.append(bool(left.max() > 4 * self.tolerance))
+            residuals = np.linalg.norm(tracks[steps, n] - particle.destinations, axis=1)
+            missing.append(bool(residuals.max() > 4 * self.tolerance))
         return missing
 
     def _aim_for_the_picture(self, search: Search, level: GridStart) -> None:
@@ -332,9 +332,9 @@ class _Matcher:
                     steps = [round(t / dt) for t in particle.times]
                     if step in steps:
                         place = particle.destinations[steps.index(step)]
-                        left = warp.source_at(place[None])[0] - particle.point
-                        missed = max(missed, float(np.linalg.norm(left)))
-                        by[n] += 0.5 * np.linalg.solve(_slope(warp, place), left)
+                        residual = warp.source_at(place[None])[0] - particle.point
+                        missed = max(missed, float(np.linalg.norm(residual)))
+                        by[n] += 0.5 * np.linalg.solve(_slope(warp, place), residual)
             if missed <= self.tolerance:
                 return
             search.settle(FINE, level, corrections=corrections)
@@ -375,10 +375,10 @@ def _measured(matcher: _Matcher, stopped: bool, log: SearchLog, began: float) ->
     animation, particles = matcher.animation, matcher.particles
     given, found = matcher.given, matcher.found
     timeline = animation.timeline
-    whole = replace(animation, forces=(*given, *found))
+    moved = replace(animation, forces=(*given, *found))
     steps = sorted({round(t / timeline.dt) for particle in particles for t in particle.times})
     points = np.array([particle.point for particle in particles])
-    tracks, maps, jacobian = _tracks(whole.solver, timeline, (*given, *found), points, steps)
+    tracks, maps, jacobian = _tracks(moved.solver, timeline, (*given, *found), points, steps)
     arrivals = []
     for n, particle in enumerate(particles):
         for t, destination, weight in zip(
@@ -395,7 +395,7 @@ def _measured(matcher: _Matcher, stopped: bool, log: SearchLog, began: float) ->
             replace(arrival, reason=reason_unreached(arrival, arrivals, animation)) for arrival in arrivals
         ]
     return Match(
-        whole,
+        moved,
         found,
         tuple(arrivals),
         tracks,

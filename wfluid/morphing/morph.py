@@ -21,7 +21,7 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.run import Run, RunTimes
-from wfluid.domain.curves import DELAY, EASE, local
+from wfluid.domain.curves import DELAY, EASE, delayed_part
 from wfluid.domain.operators import blurred
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -126,7 +126,7 @@ class Morph:
     def _warped(self, index: int, ahead: np.ndarray | None) -> np.ndarray:
         """The part of the flow's time that a frame shows: one number, or (ny, nx)."""
         part, settings = self._part(index), self.settings
-        far = settings.warp_curve.at(part if ahead is None else local(part, ahead, settings.delay))
+        far = settings.warp_curve.at(part if ahead is None else delayed_part(part, ahead, settings.delay))
         return np.interp(far, self._ways, np.linspace(0.0, 1.0, len(self._ways)))
 
     @cached_property
@@ -169,7 +169,7 @@ class Morph:
                 pictures.append(look_up.untouched if still else look_up.render(state.d_x, state.d_y))
                 lookup += clock() - looked
             own = self._part(index)
-            weight = settings.blend_curve.at(own if mask is None else local(own, mask, settings.delay))
+            weight = settings.blend_curve.at(own if mask is None else delayed_part(own, mask, settings.delay))
             picture = blended(*pictures, weight, settings.blend)
             seconds.lookup += lookup
             seconds.simulate += clock() - began - lookup
@@ -190,9 +190,9 @@ class Morph:
         arrivals, animation = self.match.arrivals, self.animation
         points = np.array([arrival.keyframe.point for arrival in arrivals])
         wanted = np.array([arrival.keyframe.destination for arrival in arrivals])
-        left = self.passage.until_end(0.0).source_at(points) - wanted
+        residual = self.passage.until_end(0.0).source_at(points) - wanted
         grid = animation.grid
-        return np.linalg.norm(left * self.pair.window.pixels((grid.width, grid.height)), axis=1)
+        return np.linalg.norm(residual * self.pair.window.pixels((grid.width, grid.height)), axis=1)
 
     def inconsistency_px(self) -> tuple[float, float]:
         """How far the two maps are from undoing one another, mean and greatest [px of the first picture]."""
