@@ -19,7 +19,6 @@ Pixels = wp.array[Pixel]
 CLAMP = wp.constant(0)
 MIRROR = wp.constant(1)
 WRAP = wp.constant(2)
-TRANSPARENT = wp.constant(3)
 
 
 @cells

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wfluid.domain.curves import DELAY_LIMIT, Curve, curve_of, local
+from wfluid.domain.curves import DELAY_LIMIT, Curve, curve_of, delayed_part
 from wfluid.domain.piecewise import ease, hats, lerp_at
 
 PARTS = np.linspace(0, 1, 41)
@@ -94,9 +94,9 @@ def test_keys_that_are_none_are_refused(keys):
 @pytest.mark.parametrize("delay", [0.0, 0.3, DELAY_LIMIT])
 def test_white_is_ahead_of_black_by_the_delay(delay):
     """What white sees after a part s, black sees after s + delay; both take 1 - delay of the time."""
-    white, black = (local(PARTS, np.float64(one), delay) for one in (1, 0))
+    white, black = (delayed_part(PARTS, np.float64(one), delay) for one in (1, 0))
     np.testing.assert_allclose(white, np.minimum(PARTS / (1 - delay), 1), atol=1e-12)
-    np.testing.assert_allclose(local(PARTS + delay, np.float64(0), delay), white, atol=1e-12)
+    np.testing.assert_allclose(delayed_part(PARTS + delay, np.float64(0), delay), white, atol=1e-12)
     assert np.all(white >= black) and black[0] == white[0] == 0 and black[-1] == white[-1] == 1
 
 
@@ -105,12 +105,12 @@ def test_grey_is_between():
     begins, ends = 0.4 * (1 - ahead), 0.4 * (1 - ahead) + 0.6
     for part in PARTS:
         wanted = np.clip((part - begins) / (ends - begins), 0, 1)
-        np.testing.assert_allclose(local(part, ahead, 0.4), wanted, atol=1e-12)
+        np.testing.assert_allclose(delayed_part(part, ahead, 0.4), wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
 def test_without_a_delay_a_mask_says_nothing(value):
-    np.testing.assert_array_equal(local(PARTS, np.full(PARTS.shape, value), 0.0), PARTS)
+    np.testing.assert_array_equal(delayed_part(PARTS, np.full(PARTS.shape, value), 0.0), PARTS)
 
 
 def test_lines_between_samples_end_at_them():

@@ -23,6 +23,7 @@ from control_cases import (
 )
 
 from wfluid import Constant, Fluid, Free, Freeze, Functional, GaussianForce, Grid, Growth, Keyed, State
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.objectives import Effort, ParticleMisfit
 from wfluid.gradient.state_objectives import DensityMisfit
 
@@ -203,7 +204,7 @@ STRETCHES = {
 def test_a_functional_with_the_graphs_of_another_computes_the_same(device, name, weight):
     """Value and gradient to the bit, over stretch after stretch, with other numbers and other ones free."""
     fluid, forces = Fluid(**FLUIDS[name]), [PUSH, *LATE]
-    last, sure = None, False
+    graphs, last, sure = GraphCache(), None, False
     for n, (words, stretch) in enumerate(STRETCHES.items()):
         stretch, points = dict(stretch), POINTS
         if "begin" in stretch:
@@ -217,7 +218,7 @@ def test_a_functional_with_the_graphs_of_another_computes_the_same(device, name,
         free = [FREE, Free("forces[1].center")][: 1 + n % 2]
         one, other = (
             Functional(GRID, fluid, forces, TIMELINE, objective, free, device=str(device), **stretch, **more)
-            for more in ({}, {"like": last, "room": END})
+            for more in ({}, {"graphs": graphs, "room": END})
         )
         for _ in range(2):
             (expected, slopes), (got, found) = (each.value_and_gradient(each.start) for each in (one, other))
@@ -233,6 +234,7 @@ def test_a_functional_with_the_graphs_of_another_computes_the_same(device, name,
     "change",
     [
         {"fluid": Fluid(viscosity=0.02)},
+        {"fluid": Fluid(viscosity=0.01, walls="no-slip")},
         {"forces": [PUSH]},
         {"forces": [PUSH, *LATE, GROWING]},
         {"objective": MAP},
@@ -258,11 +260,27 @@ def test_graphs_that_do_not_suit_are_not_taken_over(device, change):
     }
     of = change.pop("of", {})
     objective = misfit(POINTS, of.get("end", END))
-    first = Functional(**usual | {"objective": objective} | of)
+    graphs = GraphCache()
+    first = Functional(**usual | {"objective": objective} | of, graphs=graphs)
     first.value(first.start)
-    second, expected = Functional(**usual | change, like=first), Functional(**usual | change)
+    second, expected = Functional(**usual | change, graphs=graphs), Functional(**usual | change)
     assert second._recording is not first._recording
     assert second.value(second.start) == expected.value(expected.start)
+    first.value(first.start)  # still has its graphs
+
+
+def test_a_functional_whose_graphs_were_taken_over_refuses_to_run(device):
+    """Its tables hold another's run: it would return another's value."""
+    graphs, objective = GraphCache(), ParticleMisfit(POINTS, WANTED, END)
+    fluid = Fluid(viscosity=0.01)
+    first, second = (
+        Functional(GRID, fluid, [force], TIMELINE, objective, [FREE], device=str(device), graphs=graphs)
+        for force in (PUSH, replace(PUSH, vector=(0.0, 1.0)))
+    )
+    assert second._recording is first._recording
+    second.value(second.start)
+    with pytest.raises(RuntimeError, match="taken over"):
+        first.value(first.start)
 
 
 FREE = Free("forces[0].vector")

@@ -9,7 +9,7 @@ import pytest
 from wfluid import Timeline
 from wfluid.keyframes.keyframes import ParticleKeyframe, targets_of
 from wfluid.keyframes.search import Smoothness
-from wfluid.keyframes.way_misfit import HOLD, WayMisfit
+from wfluid.keyframes.way_misfit import HOLD, WayMisfit, longest
 from wfluid.keyframes.ways import (
     LEAST_STEPS,
     LEAST_WINDOWS,
@@ -192,16 +192,17 @@ def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius(led):
     squares = np.sum((off / 0.1) ** 2, axis=1)
     journey = journey_of(paths, (0.25, 0.5, 0.75, 1.0), [pin], guided=[bool(led)] * 3)
     ways = [Way(one, 0.0) for one in particles(*paths, pins=[pin])]
+    places = {t: np.array([way.at(t) for way in ways]) + off for t in journey.times}
     for t, weights in {
         0.25: (led, led, HOLD),
         0.5: (1.0, led, 1.0),
         0.75: (0.0, led, HOLD),
         1.0: (0.0, 1.0, 1.0),
     }.items():
-        value, slope = journey.at(t, np.array([way.at(t) for way in ways]) + off)
+        value, slope = journey.at(t, places[t])
         assert value == pytest.approx(0.5 * np.dot(weights, squares), rel=1e-9)
         np.testing.assert_allclose(slope, np.array(weights)[:, None] * off / 0.1**2, rtol=1e-9)
-    assert journey.worst == pytest.approx(0.1)  # of the pin, at its keyframes
+    assert longest(journey.misfits(places)) == pytest.approx(0.1)  # of the pin, at its keyframes
 
 
 def test_a_journey_leads_only_the_points_it_is_told_to():
@@ -213,13 +214,14 @@ def test_a_journey_leads_only_the_points_it_is_told_to():
 
 
 def test_the_misfit_aims_beside_places_by_corrections_and_multipliers():
-    """A shift moves the place itself; a lure only what is aimed at, so that the misfit remains one."""
+    """A correction moves the place itself; a multiplier only the aim, so that the misfit stays."""
     by = {1.0: np.array([[0.02, -0.02]])}
     for kind, left in (("corrections", 0.0), ("multipliers", np.hypot(0.02, 0.02))):
         journey = journey_of([((0.3, 0.4), {1.0: (0.5, 0.3)})], (0.5, 1.0), **{kind: by})
         value, slope = journey.at(1.0, np.array([[0.52, 0.28]]))
         assert value == pytest.approx(0, abs=1e-12) and np.abs(slope).max() < 1e-9
-        assert journey.worst == pytest.approx(left, abs=1e-12)
+        misfits = journey.misfits({1.0: np.array([[0.52, 0.28]])})
+        assert longest(misfits) == pytest.approx(left, abs=1e-12)
         assert journey.at(1.0, np.array([[0.5, 0.3]]))[0] == pytest.approx(0.5 * 0.08)
 
 

@@ -152,6 +152,7 @@ def run(picture: Picture, solver: Solver, lookup: LookUp, seam: Seam, drawing: D
         assert_type(frame.quality.jacobian_min, float)
         assert_type(frame.solve, SolveReport | None)
     shot = Animation(picture, Fluid(), [], Timeline(1.0))
+    assert_type(shot.frames(), Run[Frame])
     assert_type(write_animation("a.gif", shot.frames()), list[FilePath])
     assert_type(shot.frames(), Run[Frame])
     made = morph(picture, picture, [((0.4, 0.3), (0.3, 0.3))])

@@ -1,6 +1,6 @@
-"""What an animation will take, before it is run.
+"""Memory and time of an animation, estimated before it runs.
 
-Memory follows from the arrays it makes, time from figures measured on one core of a 2 GHz server CPU.
+Memory follows from the arrays that it allocates, time from measurements on one core of a 2 GHz server CPU.
 """
 
 from __future__ import annotations
@@ -8,49 +8,51 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from wfluid.animation.animation import Animation
+from wfluid.animation.run import QUEUED_FRAMES
 from wfluid.system.memory import free_memory, readable_size
 
 FIELDS, COUPLED_FIELDS = 77, 114
-"""Fields of the finest grid that a solver, two states and their hierarchies hold, by kind of diffusion."""
+"""Arrays of the finest grid's size that solver, multigrid levels and two states take: diffusion of separate
+components, and of coupled ones."""
 
 FIELDS_PER_PIXEL = 3
-"""Fields of the frames' size: two coordinates and what is being copied out."""
+"""Arrays of the frames' size: two coordinates, and one channel being copied out."""
 
 SECONDS_PER_CELL_STEP, COUPLED_SECONDS = 100e-9, 400e-9
 SECONDS_PER_PIXEL = 40e-9
 
-QUEUED_FRAMES = 6
-"""Frames in flight between computing and writing."""
+FRAMES_IN_FLIGHT = QUEUED_FRAMES + 2
+"""Frames in memory: those that wait, the one being computed and the one being written."""
 
 PROGRAM = 240e6
-"""Bytes that Python and the libraries take before the first array."""
+"""Memory of Python and the libraries before the first array [bytes]."""
 
-DENSITY_FIELDS = 15
-"""Fields that a density takes, where it diffuses."""
+DENSITY_FIELDS = 17
+"""Arrays of the grid's size for a density that diffuses."""
 
 LOOP_FRAMES = {"oscillate": (1.0, 2.0), "pingpong": (0.5, 0.5), "crossfade": (0.25, 1.25)}
-"""By kind of loop: the part of its frames that are kept, and that are run."""
+"""By kind of loop: the fraction of its frames that are kept, and that are simulated."""
 
 FIELDS_A_STEP = 6
-"""Of a morph's flow: a velocity, and two maps of two components."""
+"""Arrays for each step of a morph's flow: a velocity and two maps of two components each."""
 
 _REAL = 4
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a run takes, roughly."""
+    """Rough memory and time of a run."""
 
     memory: float
-    """Bytes at the peak."""
+    """Peak memory [bytes]."""
     seconds: float
-    """Time without compiling and writing."""
+    """Time without compiling and writing [s]."""
 
 
 def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> Estimate:
-    """Memory and time of an animation from its sizes alone, or of a morph shown in so many frames.
+    """Memory and time of an animation, or of a morph of so many frames, from sizes alone.
 
-    `frames_kept` is how many outputs hold every frame until the last: a GIF's palette needs them all.
+    `frames_kept` is the number of outputs that keep all frames until the last: a GIF's palette needs them.
     """
     grid, picture = animation.grid, animation.picture
     width, height = animation.width or picture.width, animation.height or picture.height
@@ -59,11 +61,13 @@ def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | Non
     memory = _REAL * (
         (FIELDS if apart else COUPLED_FIELDS) * grid.nx * grid.ny
         + (channels + 2 * picture.pixels.shape[2]) * picture.width * picture.height
-        + (channels + FIELDS_PER_PIXEL + QUEUED_FRAMES * picture.pixels.shape[2]) * width * height
+        + (channels + FIELDS_PER_PIXEL + FRAMES_IN_FLIGHT * picture.pixels.shape[2]) * width * height
     )
     frames = morph_frames or animation.frame_count
     shown = 2 if morph_frames else 1 + len(animation.layers)
-    memory += (shown - 1) * _REAL * (channels + FIELDS_PER_PIXEL + channels * QUEUED_FRAMES) * width * height
+    memory += (
+        (shown - 1) * _REAL * (channels + FIELDS_PER_PIXEL + channels * FRAMES_IN_FLIGHT) * width * height
+    )
     densities = len(animation.fluid.densities)
     memory += _REAL * grid.nx * grid.ny * (DENSITY_FIELDS * densities)
     if morph_frames:
@@ -79,10 +83,10 @@ def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | Non
 
 
 def check_memory(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> None:
-    """Refuse an animation that will not fit.
+    """Refuse an animation that exceeds the free memory.
 
     Raises:
-        ValueError: with what it needs and what there is.
+        ValueError: with the memory that it needs and that is free.
     """
     need, there = estimate(animation, frames_kept, morph_frames).memory, free_memory()
     if need > there:

@@ -1,13 +1,12 @@
-"""Animations without a beginning: how frames follow one another when the last meets the first.
+"""Loops: animations whose last frame is followed by the first.
 
-"oscillate"  All periods are fitted to the loop, so that the flow comes back to itself. Each force begins
-             with the blow that makes its velocity swing about zero, a lap is run for the flow to find
-             its course, and the picture is untouched where the loop begins. A fluid that swings also
-             streams slowly; that drift is taken off evenly over the loop, and what is left between the
-             two velocities at the seam near it.
+"oscillate"  All periods are fitted to the loop, so that the flow is periodic. An impulse at the start of
+             each force makes its velocity swing about zero; one lap is run for the flow to become periodic,
+             and the loop begins with the untouched picture. A swinging fluid also streams slowly: that
+             drift is subtracted evenly over the loop, and the jump of velocity at the seam near the seam.
 "pingpong"   Forwards, then backwards.
-"crossfade"  What follows the end flows into the beginning: the maps are blended, not the colours, so
-             nothing is seen double.
+"crossfade"  The frames after the end are blended into the beginning. Maps are blended, not colours, so that
+             nothing appears double.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from wfluid.model.noise_force import NoiseForce
 from wfluid.model.uniform_forces import Buoyancy
 
 FADE = 0.25
-"""Part of a loop over which its end flows into its beginning, or velocities are made to meet."""
+"""Fraction of a loop over which its end is blended into its beginning, or velocities are matched."""
 
 
 @dataclass
@@ -47,16 +46,16 @@ class Seam:
     velocity_mean: float = 0.0
     """Its mean."""
     drift_max: float = 0.0
-    """Longest way that an oscillating loop streamed, and that was taken off [longer side]."""
+    """Largest drift that was subtracted from an oscillating loop [longer side]."""
     drift_mean: float = 0.0
     """Its mean."""
 
 
 def check_loop(loop: str, forces: Sequence[Force]) -> None:
-    """Refuse a loop that does not exist, or that has nothing to fit.
+    """Refuse an unknown loop, or one to oscillate without an oscillating force.
 
     Raises:
-        ValueError: with what there is.
+        ValueError: with the known loops, or the remedy.
     """
     if loop not in LOOPS:
         raise ValueError(f"loop {loop!r}: expected one of {', '.join(LOOPS)}")
@@ -69,7 +68,7 @@ def check_loop(loop: str, forces: Sequence[Force]) -> None:
 def fit_to_loop(force: Force, length: float) -> Force:
     """The force with all its periods fitted to a loop of `length` seconds.
 
-    An oscillator goes on through the seam: when it starts shifts only its phase.
+    An oscillator acts all the time: its start only shifts its phase.
     """
     force = replace(force, envelope=_fitted(force.envelope, length))
     if isinstance(force, NoiseForce) and force.period is not None:
@@ -99,9 +98,9 @@ def _oscillates(force: Force) -> bool:
 
 
 def starting_impulses(forces: Sequence[Force], length: float, steps: int) -> list[Force]:
-    """What to strike the resting fluid with, so that each force's velocity swings about zero in its loop.
+    """Impulses on the resting fluid that make the velocity due to each force swing about zero.
 
-    A force e(t) has given the integral E(t) of e; the blow is minus E's mean over the loop.
+    With the envelope e and its integral E, the impulse is minus the mean of E over the loop.
     """
     struck: list[Force] = []
     for force in forces:
@@ -116,16 +115,16 @@ def starting_impulses(forces: Sequence[Force], length: float, steps: int) -> lis
 
 
 def frames_of(loop: str, frames: int) -> int:
-    """How many frames a loop of so many shows: an even number where it turns round."""
+    """The number of frames that a loop shows: an even one for a pingpong."""
     return 2 * max(1, round(frames / 2)) if loop == "pingpong" else max(1, frames)
 
 
 def loop_frames(
     loop: str, runner: Simulation, forces: Sequence[Force], frames: int, fps: float, seam: Seam
 ) -> Iterator[SimulatedFrame]:
-    """The moments to show, one a frame, and the seam's figures when they are through.
+    """The fluid at every frame of a loop; after the last one the seam's measurements are filled in.
 
-    A moment's state is overwritten when the next is asked for.
+    A frame's state is overwritten when the next is asked for.
     """
     order = {"oscillate": _oscillating, "pingpong": _turning, "crossfade": _fading}[loop]
     kept: dict[int, np.ndarray] = {}
@@ -148,7 +147,7 @@ def loop_frames(
 def _oscillating(
     runner: Simulation, forces: Sequence[Force], frames: int, seam: Seam
 ) -> Iterator[SimulatedFrame]:
-    """A lap for the flow, then one from the untouched picture, its end bent to meet its beginning."""
+    """One lap for the flow to become periodic, then one from the untouched picture, bent to close."""
     struck = starting_impulses(
         forces, runner.timeline.time_of(frames * runner.timeline.steps_per_frame), frames
     )
@@ -166,7 +165,7 @@ def _oscillating(
         terms = zip(weights, (snapshot, first, second, last, after), strict=True)
         closed = Snapshot.sum_of(*terms)
         s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
-        fade = ease(s)  # densities do not swing: towards the end they flow into their beginning
+        fade = ease(s)  # densities do not swing: their end is blended into their beginning
         poured = Snapshot.sum_of((1 - fade, snapshot), (fade, first))
         yield SimulatedFrame(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
 
@@ -192,7 +191,7 @@ def _turning(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) 
 
 
 def _fading(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[SimulatedFrame]:
-    """From where the fade ends to the end, then what follows it, flowing into the beginning."""
+    """From the end of the fade to the end of the loop, then the frames after it, blended into the first."""
     fading = max(1, round(FADE * frames))
     kept: list[Snapshot] = []
     for n, moment in enumerate(runner.moments(forces, frames + fading)):

@@ -9,6 +9,9 @@ from typing import Generic, TypeVar
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
 
+QUEUED_FRAMES = 4
+"""Frames that may wait to be written while the next are computed: evens out frames that are slow to write."""
+
 ShownFrame = TypeVar("ShownFrame", bound=Frame)
 
 

@@ -1,4 +1,4 @@
-"""Runs a solver frame by frame, and judges what its solves left."""
+"""Steps a solver from frame to frame, and checks the residuals of its solves."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POOR_RESIDUAL = 0.02
 
 
 class PoorSolveWarning(UserWarning):
-    """A solve left more than it should; the message has the number and the remedy."""
+    """A solve's residual is too large; the message has the number and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class SimulatedFrame:
     """The fluid at one frame."""
 
     state: State
-    """What it is; written over as the run goes on."""
+    """Its state; overwritten when the next frame is asked for."""
     solve: SolveReport | None
-    """What the last step's solves left; None where no step led here."""
+    """Residuals of the last step's solves; None if there was no step."""
 
 
 class Simulation:
@@ -44,14 +44,14 @@ class Simulation:
         self._warned = False
 
     now: State
-    """The fluid as it is."""
+    """The current state of the fluid."""
     spare: State
     """A state that the next step writes over."""
 
     def moments(
         self, forces: Sequence[Force], frames: int, first: Sequence[Force] = ()
     ) -> Iterator[SimulatedFrame]:
-        """The fluid as it is, and then after each of so many frames; the forces' time begins at 0.
+        """The current fluid, and then the fluid after each of so many frames; the forces' time begins at 0.
 
         The forces `first` act in the first step too.
         """
@@ -68,16 +68,16 @@ class Simulation:
             yield SimulatedFrame(self.now, solve)
 
     def untouch(self) -> None:
-        """Let the picture, densities and points be as at rest; the flow goes on."""
+        """Reset map, densities and points to those at rest; the velocity stays."""
         rest = self.solver.rest(self._points)
         for untouched, array in zip(rest.seen, self.now.seen, strict=True):
             copy(untouched, array)
 
 
 def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
-    """Stop where the fluid is no longer finite; warn once of a projection that left too much.
+    """Stop where the fluid is not finite; warn once of a solve with a large residual.
 
-    The paper's own scheme is not warned of: few Jacobi sweeps are part of it.
+    The paper's own scheme gives no warning: few Jacobi sweeps are part of it.
     """
     pressure = solve.pressure
     if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
@@ -93,7 +93,7 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
 
 
 def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
-    """What a step's solves left too much of, with the remedy; None if nothing."""
+    """A warning of a large residual, with the remedy; None if there is none."""
     pressure, diffusion = solve.pressure, solve.diffusion
     if pressure.relative > POOR_RESIDUAL:
         left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"

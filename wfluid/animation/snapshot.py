@@ -1,4 +1,4 @@
-"""What loops keep of a frame, on the host."""
+"""Copies of the visible part of a state, on the host, for loops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wfluid.fields.state import State
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What of a state is seen: a copy of its map, its points and its densities, ghosts included."""
+    """A copy of a state's map, points and densities, ghosts included."""
 
     moved: tuple[np.ndarray, ...]
     """Both components of the map and of the points."""
@@ -21,12 +21,12 @@ class Snapshot:
 
     @classmethod
     def of(cls, state: State) -> Snapshot:
-        """A copy of what a state shows."""
+        """A copy of the visible part of a state."""
         return cls(*(tuple(read(array).copy() for array in arrays) for arrays in _seen(state)))
 
     @classmethod
     def sum_of(cls, *terms: tuple[float, Snapshot]) -> Snapshot:
-        """A sum of snapshots, each times its weight."""
+        """A weighted sum of snapshots."""
 
         def summed(*arrays: np.ndarray) -> np.ndarray:
             weights = (array.dtype.type(weight) for (weight, _), array in zip(terms, arrays, strict=True))
@@ -37,7 +37,7 @@ class Snapshot:
         return cls(tuple(summed(*arrays) for arrays in moved), tuple(summed(*arrays) for arrays in poured))
 
     def onto(self, state: State) -> State:
-        """Write it over what a state shows; returns the state."""
+        """Write the snapshot into a state; returns the state."""
         for values, arrays in zip((self.moved, self.poured), _seen(state), strict=True):
             for value, array in zip(values, arrays, strict=True):
                 assign(value, array)

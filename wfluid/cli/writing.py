@@ -13,7 +13,7 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
-from wfluid.animation.run import Run
+from wfluid.animation.run import QUEUED_FRAMES, Run
 from wfluid.cli.progress import FrameProgress
 from wfluid.cli.report import Report
 from wfluid.files.output import open_output
@@ -22,9 +22,6 @@ from wfluid.pictures.picture import Picture
 from wfluid.scene.scene import Output, Scene
 from wfluid.system.interrupt import HeldInterrupt
 from wfluid.view.densities import upsample
-
-QUEUED_FRAMES = 4
-"""Frames that may wait for the disk while the next ones are computed."""
 
 
 class _Writer(Protocol):

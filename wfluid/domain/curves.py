@@ -71,10 +71,10 @@ def curve_of(what: str | Curve | Mapping[float, float], duration: float) -> Curv
     return Curve(tuple(sorted(keys.items())))
 
 
-def local(part: float, ahead: np.ndarray, delay: float) -> np.ndarray:
-    """The part of its own time that a place has behind it, after a part of the whole.
+def delayed_part(part: float, ahead: np.ndarray, delay: float) -> np.ndarray:
+    """The elapsed part of each place's own time, 0 … 1, after a part of the total time.
 
-    Places where `ahead` is 1 begin at once, those where it is 0 after `delay`, a part of the time; all take
-    equally long, the last until the end.
+    Places where `ahead` is 1 begin at once, those where it is 0 after `delay`, a part of the total time. All
+    take equally long; the last end with the total time.
     """
     return np.clip((part - delay * (1 - ahead)) / (1 - delay), 0.0, 1.0)

@@ -30,6 +30,7 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.fields.state import State
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.objectives import Effort, Objective, ParticleObjective, points_of, terms_of, times_of
 from wfluid.gradient.recording import Recording, RunGradients, StepRange
 from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
@@ -43,21 +44,33 @@ from wfluid.step.gaussians import gaussian_impulse_of
 from wfluid.step.step import Step
 
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
-"""Most that conjugate gradients may leave undone of a solve."""
+"""Largest relative residual that conjugate gradients may leave."""
 
 
 ROUNDING = 1e-6
-"""How far outside a point on an edge may be that a run has left there [longer side]."""
+"""How far outside the picture rounding may leave a point on its edge [longer side]."""
 
 
 @dataclass
 class EvaluationTimes:
-    """Where the time of evaluations went [s]."""
+    """Time spent on evaluations [s]."""
 
     forward: float = 0.0
     """Simulations."""
     backward: float = 0.0
     """Their adjoints."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """An objective at one vector of free numbers."""
+
+    value: float
+    """The objective."""
+    gradient: np.ndarray
+    """Its gradient, of the vector's length."""
+    places: Mapping[float, np.ndarray]
+    """Positions of all the objective's particles [longer side], (n, 2), by the times it looks at them [s]."""
 
 
 class Functional:
@@ -86,7 +99,7 @@ class Functional:
         end: float | None = None,
         memory_mb: float | None = None,
         device: str | None = None,
-        like: Functional | None = None,
+        graphs: GraphCache | None = None,
         room: float = 0.0,
     ):
         """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
@@ -94,12 +107,13 @@ class Functional:
         With `begin`, a time [s] and the fluid at that time (`state_after`), the run goes on from there; the
         objective's points are then places at that time. It ends with the timeline, or at the time `end`.
 
-        `memory_mb` caps what the states of the run take, by far the most of its memory; with less room most
+        `memory_mb` caps the memory for stored states, by far the largest part. If the states exceed it, most
         steps are computed twice.
 
-        With `like`, its captured graphs are taken over where they suit: those of a functional of the same
-        grid and timeline, the very same fluid, as many forces and particles, effort or none. It is of no use
-        afterwards. One with `room` [s] suits stretches of time so long.
+        `graphs` reuses captured graphs of an earlier functional that was given the same cache, if grid,
+        timeline, fluid, kinds of forces and number of particles are the same and both or neither count
+        effort; the earlier one cannot be evaluated afterwards. `room` [s] reserves tables for runs up to that
+        length, so that later functionals of longer runs can reuse the graphs too.
         """
         shape = (2, grid.ny, grid.nx)
         velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
@@ -126,11 +140,8 @@ class Functional:
             self._first = self._step_of(start, "a beginning")
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
-        before = like._recording if like else None
-        if before and (before.stages.grid, before.timeline) == (grid, timeline):
-            stages = before.stages
-        else:
-            stages, before = Step(grid, fluid, open_device(device), JUMP_TOLERANCE), None
+        before = graphs.find(grid, timeline, fluid) if graphs else None
+        stages = before.stages if before else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[DeviceObjective]] = {}
         # graphs count effort with weight 1, and so suit all weights: the others are relative to it
@@ -160,22 +171,25 @@ class Functional:
             self._recording = Recording(
                 stages, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
             )
+        self._graphs = graphs
+        if graphs:
+            graphs.keep(self._recording, self)
         self.evaluations, self.seconds = 0, EvaluationTimes()
 
     start: np.ndarray
     """The free numbers of the fluid and forces given, as a vector."""
     evaluations: int
-    """How often a value has been asked for."""
+    """Number of evaluations so far."""
     seconds: EvaluationTimes
-    """Where the time of evaluations went."""
+    """Time spent on evaluations."""
 
     @property
     def memory(self) -> int:
-        """What the states of the run take [bytes]."""
+        """Memory of the stored states [bytes]."""
         return self._recording.memory
 
     def setup(self, m: np.ndarray) -> Setup:
-        """Fluid, forces and velocity that a vector stands for.
+        """Fluid, forces and velocity with the free numbers of a vector.
 
         Raises:
             ValueError: a vector of another length, with numbers that are not finite, or out of range.
@@ -187,7 +201,7 @@ class Functional:
 
         Raises:
             ValueError: as `setup`, or a force that would add more than the limit.
-            FloatingPointError: the run does not stay finite; with the step from which on.
+            FloatingPointError: the run does not stay finite; the message names the first bad step.
         """
         return self._forward(m)[0]
 
@@ -206,33 +220,50 @@ class Functional:
 
         Raises:
             ValueError: as `value`.
+            FloatingPointError: as `evaluate`.
+        """
+        found = self.evaluate(m)
+        return found.value, found.gradient
+
+    def evaluate(self, m: np.ndarray) -> Evaluation:
+        """The objective at m, its gradient and the positions of its particles.
+
+        Raises:
+            ValueError: as `value`.
             FloatingPointError: the run or the gradient is not finite; with the step where that begins.
         """
-        value, pulls = self._forward(m)
+        value, pulls, places = self._forward(m)
         began = time.perf_counter()
         found = self._recording.backward(pulls)
         m = np.asarray(m, dtype=np.float64)
         gradient = self._scale * self.variables.pull_back(self._gradients(found), m)
         if not np.all(np.isfinite(gradient)):
-            self._recording.forward()  # a run with little memory has lost its end on the way back
+            self._recording.forward()  # with little memory the backward pass has overwritten the end
             self._recording.backward(pulls, watch=self._refuse)
             slices = self.variables.slices
             wrong = [one.name for one in slices if not np.all(np.isfinite(gradient[one.entries]))]
             raise FloatingPointError(f"the gradient with respect to {', '.join(wrong)} is not finite")
         self.seconds.backward += time.perf_counter() - began
-        return value, gradient
+        return Evaluation(value, gradient, places)
 
-    def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray]]:
-        """The value, and the gradients with respect to the particles' places by step."""
+    def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray], dict[float, np.ndarray]]:
+        """The value, the gradients with respect to particles' positions by step, those positions by time.
+
+        Raises:
+            RuntimeError: a later functional has taken over the graphs of this one.
+        """
+        if self._graphs and not self._graphs.serves(self._recording, self):
+            raise RuntimeError("a later functional has taken over the graphs of this one")
         self.evaluations += 1
         began, recording = time.perf_counter(), self._recording
         self._setup = self.variables.unpack(m)
         recording.set(self._setup)
         places = recording.forward(self._looked_at)
-        value, pulls = recording.value, {}
+        value, pulls, at_times = recording.value, {}, {}
         for weight, term, own in self._particles:
             for t in term.times:
                 step = self._step_of(t)
+                at_times[t] = places[step]
                 part, slope = term.at(t, places[step][own])
                 value += weight * part
                 pulls.setdefault(step, np.zeros_like(places[step]))[own] += weight * slope
@@ -245,7 +276,7 @@ class Functional:
                 "smaller forces or steps help"
             )
         self.seconds.forward += time.perf_counter() - began
-        return value * self._scale, pulls
+        return value * self._scale, pulls, at_times
 
     def _refuse(self, step: int, bar: State) -> None:
         if not bar.finite:
@@ -265,7 +296,7 @@ class Functional:
     def _add_slopes(
         self, gradients: dict, where: str, forces: Sequence, found: Mapping[int, np.ndarray]
     ) -> None:
-        """Sum over the steps what each force's own numbers have for gradients."""
+        """Sum the gradients of each force's numbers over the steps."""
         for n, force in enumerate(forces):
             name = f"{where}[{n}]"
             if not self.variables.has(name):
@@ -279,7 +310,7 @@ class Functional:
                     gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
 
     def _step_of(self, t: float, what: str = "an objective") -> int:
-        """How many steps of the run end up to a time.
+        """The number of steps from the run's beginning to a time.
 
         Raises:
             ValueError: outside the run, or between two steps.

@@ -126,9 +126,9 @@ class ParticleMisfit(ParticleObjective):
 
     def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
         """Half the weighted sum of squares, and the weighted misfits."""
-        left = places - self.destinations
-        slope = self.weights[:, None] * left
-        return 0.5 * float(np.sum(slope * left)), slope
+        misfit = places - self.destinations
+        slope = self.weights[:, None] * misfit
+        return 0.5 * float(np.sum(slope * misfit)), slope
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""How close a point came to its target, and why no closer."""
+"""Residuals of keyframes, and the reasons of those that cannot be reached."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from wfluid.domain.walls import Wall
 from wfluid.keyframes.keyframes import ParticleKeyframe
 
 FROZEN = 0.3
-"""Paint of a freeze mask above which a point is held for good."""
+"""Value of a freeze mask above which a point cannot be moved."""
 
 
 @dataclass(frozen=True, eq=False)
 class Arrival:
-    """How near a point came to one of its keyframes."""
+    """The result for one keyframe of a point."""
 
     keyframe: ParticleKeyframe
-    """Where it should be, and when."""
+    """Its destination and time."""
     pinned: bool
-    """Whether it should stay there all the time."""
+    """Whether the point should stay in its place all the time."""
     particle: Place
-    """Where the point is, followed by the flow [longer side]."""
+    """Position of the point carried by the flow [longer side]."""
     source: Place
-    """What place of the picture the map shows at the destination [longer side]."""
+    """Source in the picture that the map has for the destination [longer side]."""
     reason: str = ""
-    """Why it cannot be nearer, where something is known."""
+    """Why the keyframe cannot be reached, if known."""
 
     @property
     def residual(self) -> float:
@@ -56,7 +56,7 @@ def _cell(place: np.ndarray, grid: Grid) -> tuple[int, int]:
 
 
 def reason_unreached(arrival: Arrival, arrivals: Sequence[Arrival], animation: Animation) -> str:
-    """Why a point cannot come nearer to its keyframe, where geometry says it."""
+    """The geometric reason why a keyframe cannot be reached; "" if none is known."""
     grid, fluid = animation.grid, animation.fluid
     point, destination = np.array(arrival.keyframe.point), np.array(arrival.keyframe.destination)
     extent, cell = np.array([grid.width, grid.height]), max(grid.hx, grid.hy)

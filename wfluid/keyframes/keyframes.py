@@ -1,4 +1,4 @@
-"""Particle keyframes: where points of the picture should be, and when (Bonilla & Velho, section III)."""
+"""Particle keyframes: destinations of points of the picture in time (Bonilla & Velho, section III)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 from wfluid.domain.paths import Place
 
 TOLERANCE = 0.25 / 512
-"""Residual that is good enough [longer side]: a quarter of a pixel of a picture of 512."""
+"""Default tolerance of residuals [longer side]: a quarter of a pixel of a picture 512 pixels long."""
 
 COINCIDENT = 1e-6
-"""Places nearer than this are one [longer side]."""
+"""Places closer than this are the same [longer side]."""
 
 
 @dataclass(frozen=True)
 class ParticleKeyframe:
-    """A point of the picture should be somewhere at a time; several of one point make a path.
+    """The destination of a point of the picture at a time; several of one point make a path.
 
     Raises:
         ValueError: numbers that are not finite, a time that is not positive, a weight that is not positive.
@@ -29,11 +29,11 @@ class ParticleKeyframe:
     point: Place
     """Place of the point in the untouched picture [longer side]."""
     destination: Place
-    """Where it should be [longer side]."""
+    """Its destination [longer side]."""
     time: float
-    """When [s], after 0."""
+    """Time of arrival [s], after 0."""
     weight: float = 1.0
-    """How much its misfit counts beside others."""
+    """Weight of its misfit in the objective."""
 
     def __post_init__(self) -> None:
         for name in ("point", "destination"):
@@ -49,16 +49,16 @@ class ParticleKeyframe:
 
 @dataclass(frozen=True, eq=False)
 class PointTarget:
-    """A point with its keyframes in their order."""
+    """A point with its keyframes in order of time."""
 
     point: Place
     """Place in the untouched picture [longer side]."""
     times: tuple[float, ...]
-    """When [s]."""
+    """Times of the keyframes [s]."""
     destinations: np.ndarray
-    """Where [longer side], (keyframes, 2)."""
+    """Destinations [longer side], (keyframes, 2)."""
     weights: tuple[float, ...]
-    """How much each counts."""
+    """Weights of the misfits."""
     pinned: bool = False
     """Whether it should stay in its place all the time."""
 
@@ -72,7 +72,7 @@ def targets_of(
 ) -> list[PointTarget]:
     """The points of keyframes, and pins, which stay until the last keyframe.
 
-    `side` is the longer side in the unit that refusals should speak of.
+    `side` is the longer side in the unit that messages use.
 
     Raises:
         ValueError: no keyframes; a place outside the picture; a time after the end; one point sent to two
@@ -109,7 +109,7 @@ def _check_inside(what: str, place: Place, extent: tuple[float, float], side: fl
 
 
 def _known(place: Place, moved: dict[Place, list[ParticleKeyframe]]) -> Place:
-    """The point that this is."""
+    """The known point at this place, or the place itself."""
     return next((other for other in moved if math.dist(place, other) < COINCIDENT), place)
 
 

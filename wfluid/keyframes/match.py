@@ -1,4 +1,4 @@
-"""Particle keyframes: forces are found that take points of a picture where they should be, in time.
+"""Particle keyframes: the search for forces that take points of a picture to their destinations in time.
 
 >>> from wfluid import Fluid, read_picture, write_animation
 >>> picture = read_picture("examples/images/cat.png")
@@ -28,7 +28,7 @@ from wfluid.animation.animation import Animation
 from wfluid.domain.grid import Grid
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
-from wfluid.gradient.functional import Functional
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.variables import Free
 from wfluid.keyframes.arrival import Arrival, reason_unreached
 from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, PointTarget, targets_of
@@ -53,47 +53,47 @@ from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.quality import measure_map
 
 COARSE_CELLS, CELLS_A_RADIUS = 64, 2.0
-"""Cells of the coarse grid along the longer side: so many, or more, so that the least radius has so many."""
+"""Least cells of the coarse grid along the longer side, and least cells within the smallest radius."""
 
 FACTORS = (1.0, 1.4, 0.65)
-"""Factors on the radii of forces: wide ones deform least, narrow ones tell near points apart."""
+"""Factors on the radii of forces: wide forces deform least, narrow ones separate near points."""
 
 NEARLY_FOLDED = 0.1
-"""Det J below which other radii are tried."""
+"""Least det J below which other radii are tried."""
 
-SPAN = 0.5
-"""Time between keyframes that is searched at once, if there are so many [s]."""
+SPAN_SECONDS = 0.5
+"""Length of the spans of time that are searched one after the other; they end at keyframes [s]."""
 
 AIMED = 2
-"""How often aims are moved for the picture's sake."""
+"""Number of corrections of destinations for the residual of the map."""
 
 REACHED, UNREACHABLE, STOPPED = "reached", "unreachable", "stopped"
 
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Forces that take points to their keyframes, and how well they do."""
+    """The result of a search: forces that take points to their keyframes, and the residuals."""
 
     animation: Animation
-    """The animation with them."""
+    """The animation with the forces found."""
     found: tuple[GaussianForce, ...]
-    """The forces found, which the animation has beside its own."""
+    """The forces found; the animation has them in addition to its own."""
     arrivals: tuple[Arrival, ...]
-    """Every keyframe: those of one point together, in the order given, pins last."""
+    """The results for all keyframes: those of one point together, in the order given, pins last."""
     tracks: np.ndarray
-    """Where each point is after every step, from 0 on [longer side], (steps + 1, points, 2)."""
+    """Position of each point at the start and after every step [longer side], (steps + 1, points, 2)."""
     jacobian: tuple[float, float]
-    """Least and greatest det of the map's Jacobian over all frames."""
+    """Least and greatest determinant of the map's Jacobian over all frames."""
     tolerance: float
-    """Residual that is good enough [longer side]."""
+    """Largest residual of a keyframe that counts as reached [longer side]."""
     status: str
     """"reached", "unreachable" or "stopped"."""
     history: tuple[Progress, ...]
-    """The search, an entry an iteration."""
+    """Progress of the search, an entry for each iteration."""
     evaluations: int
-    """Runs with their gradients, on whatever grid and for however long."""
+    """Number of gradients computed, on both grids and over spans of any length."""
     seconds: dict[str, float]
-    """Where the time went [s]: simulation, adjoint, optimiser (with all that is Python), total."""
+    """Time spent [s]: simulation, adjoint, optimiser (with all other host code), total."""
 
     @property
     def residual(self) -> float:
@@ -151,9 +151,9 @@ def match_keyframes(
     factors = FACTORS if factors is None else factors
     tries = [(factors[0], tuple(start))] if free or start else []
     tries += [] if free else [(factor, ()) for factor in factors]
-    captured: dict[Grid, Functional] = {}
+    graphs = GraphCache()
     for factor, before in tries:
-        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, captured)
+        matcher = _Matcher(animation, particles, free, before, tolerance, seed, factor, log, graphs)
         if (before or _all_stay(particles)) and (
             best := _measured(matcher, False, log, began)
         ).status == REACHED:
@@ -175,7 +175,7 @@ def match_keyframes(
 
 
 def _seconds(log: SearchLog, began: float) -> dict[str, float]:
-    """Where the time went since then."""
+    """Time spent since the start of the search."""
     total, spent = time.perf_counter() - began, log.seconds
     return {
         "simulation": spent.forward,
@@ -191,19 +191,19 @@ def _all_stay(particles: Sequence[PointTarget]) -> bool:
 
 
 def _rank(match: Match) -> tuple[bool, float]:
-    """What makes a match worse than others: not to reach, or nearly to fold; then its residual."""
+    """The order of matches: those that reach all keyframes without nearly folding first, then by residual."""
     return match.status != REACHED or match.jacobian[0] < NEARLY_FOLDED, match.residual
 
 
 def _solved_surely(fluid: Fluid) -> Fluid:
-    """The fluid; one whose viscosity moves with a diffusion as well solved as its gradient needs."""
+    """The fluid; if its viscosity moves, with the tolerance of diffusion that gradients need."""
     if not fluid.viscosity_moves:
         return fluid
     return replace(fluid, diffusion_tolerance=min(fluid.diffusion_tolerance, SURE_TOLERANCE))
 
 
 def _snapped(t: float, timeline: Timeline) -> float:
-    """The very number at which a step ends, of a time that differs from it by rounding only."""
+    """The end of a step, for a time that differs from it by rounding only."""
     end = timeline.time_of(max(1, round(t / timeline.dt)))
     return end if abs(end - t) <= 1e-6 * timeline.dt else t
 
@@ -215,7 +215,7 @@ def _check_step(t: float, timeline: Timeline) -> None:
 
 
 class _Matcher:
-    """One try: radii, spans, grids."""
+    """One attempt, with one factor on the radii of forces."""
 
     def __init__(
         self,
@@ -227,10 +227,10 @@ class _Matcher:
         seed: int,
         factor: float,
         log: SearchLog,
-        captured: dict[Grid, Functional],
+        graphs: GraphCache,
     ):
         self.animation, self.particles, self.tolerance = animation, particles, tolerance
-        self._free, self._start, self._log, self._captured = free, start, log, captured
+        self._free, self._start, self._log, self._graphs = free, start, log, graphs
         grid = animation.grid
         self.ways = plan_ways(particles, (grid.width, grid.height), seed)
         self._radii = radii_of(self.ways, factor)
@@ -240,7 +240,7 @@ class _Matcher:
 
     @property
     def found(self) -> tuple[GaussianForce, ...]:
-        """The forces found so far; those to begin with where there is no search yet."""
+        """The forces found so far; the initial ones before the first search."""
         if not self._searches:
             return self._start
         return tuple(force for search in self._searches for force in search.forces)
@@ -261,23 +261,23 @@ class _Matcher:
             coarse, fine = self._search(edges, coarse, fine)
 
     def _spans(self) -> list[list[int]]:
-        """The windows' edges, cut at keyframes where the time is long."""
+        """The edges of windows, cut into spans at keyframes where the time is long."""
         if self._free or self._start:
             return [self._edges]  # forces that may act all the time
         dt = self.animation.timeline.dt
         stops = sorted({round(t / dt) for particle in self.particles for t in particle.times})
         cuts = [0]
         for stop, following in pairwise(stops):
-            if (following - cuts[-1]) * dt > SPAN:
+            if (following - cuts[-1]) * dt > SPAN_SECONDS:
                 cuts.append(stop)
         cuts.append(stops[-1])
         return [[e for e in self._edges if a <= e <= b] for a, b in pairwise(cuts)]
 
     def _search(self, edges: list[int], coarse: GridStart, fine: GridStart) -> tuple[GridStart, GridStart]:
-        """Search one span; both levels at its end."""
+        """Search one span; returns the start of the next on both grids."""
         animation = self.animation
         scene = Problem(
-            animation.fluid, self.given, self._free, animation.timeline, animation.device, self._captured
+            animation.fluid, self.given, self._free, animation.timeline, animation.device, self._graphs
         )
         span = self._span(edges, coarse, scene)
         search = Search(scene, span, self.tolerance, self._log)
@@ -295,7 +295,7 @@ class _Matcher:
         return (coarse, fine) if last else (search.after(coarse), search.after(fine))
 
     def _span(self, edges: list[int], level: GridStart, scene: Problem) -> TimeSpan:
-        """The forces to begin with: those from before, and for points that these do not bring home."""
+        """The span with its initial forces: `start`, and new ones for points that those do not take home."""
         forces, windows, owners = list(self._start), [-1] * len(self._start), []
         owners += range(len(self.ways), len(self.ways) + len(self._start))  # chains of their own
         guided = [not self._free] * len(self.ways)
@@ -310,21 +310,21 @@ class _Matcher:
         return TimeSpan(self.ways, edges, forces, windows, owners, guided)
 
     def _missing(self, level: GridStart, scene: Problem) -> list[bool]:
-        """Which points the forces from before do not bring home."""
+        """Which points miss their keyframes with the initial forces."""
         solver = Solver(level.grid, scene.fluid, self.animation.solver.device)
         tracks = _tracks(solver, scene.timeline, (*scene.given, *self._start), level.points)[0]
         missing = []
         for n, particle in enumerate(self.particles):
             steps = [round(t / scene.timeline.dt) for t in particle.times]
-            left = np.linalg.norm(tracks[steps, n] - particle.destinations, axis=1)
-            missing.append(bool(left.max() > 4 * self.tolerance))
+            residuals = np.linalg.norm(tracks[steps, n] - particle.destinations, axis=1)
+            missing.append(bool(residuals.max() > 4 * self.tolerance))
         return missing
 
     def _aim_for_the_picture(self, search: Search, level: GridStart) -> None:
-        """Where the picture misses by more than is good enough though its particle is there, go half way.
+        """Correct destinations by half the residual of the map, where that exceeds the tolerance.
 
-        Particle and map follow one flow by different interpolations; what lies between them is the
-        grid's, and an aim in the middle leaves half of it to each.
+        Particle and map follow the same flow with different interpolations, so that they differ by a
+        discretisation error; an aim in the middle leaves half of it to each.
         """
         dt, time_of = self.animation.timeline.dt, self.animation.timeline.time_of
         corrections: dict[float, np.ndarray] = {}
@@ -338,9 +338,9 @@ class _Matcher:
                     steps = [round(t / dt) for t in particle.times]
                     if step in steps:
                         place = particle.destinations[steps.index(step)]
-                        left = warp.source_at(place[None])[0] - particle.point
-                        missed = max(missed, float(np.linalg.norm(left)))
-                        by[n] += 0.5 * np.linalg.solve(_slope(warp, place), left)
+                        residual = warp.source_at(place[None])[0] - particle.point
+                        missed = max(missed, float(np.linalg.norm(residual)))
+                        by[n] += 0.5 * np.linalg.solve(_slope(warp, place), residual)
             if missed <= self.tolerance:
                 return
             search.settle(FINE, level, corrections=corrections)
@@ -377,14 +377,14 @@ def _tracks(
 
 
 def _measured(matcher: _Matcher, stopped: bool, log: SearchLog, began: float) -> Match:
-    """Run the animation and see where its points are."""
+    """Run the animation and measure the residuals of its keyframes."""
     animation, particles = matcher.animation, matcher.particles
     given, found = matcher.given, matcher.found
     timeline = animation.timeline
-    whole = replace(animation, forces=(*given, *found))
+    moved = replace(animation, forces=(*given, *found))
     steps = sorted({round(t / timeline.dt) for particle in particles for t in particle.times})
     points = np.array([particle.point for particle in particles])
-    tracks, maps, jacobian = _tracks(whole.solver, timeline, (*given, *found), points, steps)
+    tracks, maps, jacobian = _tracks(moved.solver, timeline, (*given, *found), points, steps)
     arrivals = []
     for n, particle in enumerate(particles):
         for t, destination, weight in zip(
@@ -401,7 +401,7 @@ def _measured(matcher: _Matcher, stopped: bool, log: SearchLog, began: float) ->
             replace(arrival, reason=reason_unreached(arrival, arrivals, animation)) for arrival in arrivals
         ]
     return Match(
-        whole,
+        moved,
         found,
         tuple(arrivals),
         tracks,

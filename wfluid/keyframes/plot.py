@@ -89,7 +89,7 @@ def check_plot(path: str | os.PathLike) -> Path:
 
 
 def plot_match(match: Match, path: str | os.PathLike) -> None:
-    """Write a figure of a match as PNG, PDF or SVG, whole or not at all.
+    """Write a figure of a match as PNG, PDF or SVG, completely or not at all.
 
     Beside one another: the untouched picture with its points, arrows, trajectories and pins; the picture
     at the end of the animation, which is run for it, under a grid that was regular; and how the search
@@ -116,11 +116,11 @@ def figure_of(match: Match) -> Figure:
 
     picture = match.animation.picture
     width, height = _panel(picture)
-    whole = _LEFT + 2 * width + _CURVES + 2.5 * _GAP + _RIGHT, _BOTTOM + height + _TOP
-    figure = Figure(figsize=whole, facecolor="white")
+    total = _LEFT + 2 * width + _CURVES + 2.5 * _GAP + _RIGHT, _BOTTOM + height + _TOP
+    figure = Figure(figsize=total, facecolor="white")
 
     def panel(left: float, wide: float) -> Axes:
-        return figure.add_axes((left / whole[0], _BOTTOM / whole[1], wide / whole[0], height / whole[1]))
+        return figure.add_axes((left / total[0], _BOTTOM / total[1], wide / total[0], height / total[1]))
 
     with _styled():
         _draw_points(panel(_LEFT, width), match)

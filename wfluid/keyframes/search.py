@@ -1,15 +1,16 @@
 """The search for the forces that take particles to their keyframes.
 
-Minimised is phi (`journey`) + weight (effort + smoothness). Effort is half the integral of |f|^2 over that
-of a typical force; smoothness is half the squares of the changes, from a force to the next of its point, of
-strength and place in units of what moves a point by a radius. What that weighs keeps points a little from
-their keyframes; multipliers take them there, and where these are too slow the weight is lowered.
+It minimises phi (`way_misfit`) + weight (effort + smoothness). Effort is half the integral of |f|^2,
+divided by that of a typical force. Smoothness is half the sum of squared changes of strength and centre,
+from each force to the next one of its point, in units of what moves a point by a radius. Both keep points
+slightly away from their keyframes; multipliers remove that misfit, and where they converge too slowly the
+weight is lowered.
 
-On a coarse grid first. Window by window, each with a look at the next, forces are found that keep the points
-on their ways: a march can follow where one search over the whole time would have to aim through a flow that
-it does not know yet. Then all windows together, bound to the keyframes alone. Last on the grid asked for,
-where a few evaluations are enough. Longer scenes are cut at keyframes into spans; each begins with the fluid
-that the one before has left.
+The search has three stages. The march, on a coarse grid, finds forces window by window, together with the
+next window, that keep the points on their ways: one search over all windows would start from a flow that it
+does not know yet. Then all windows are optimised together on the coarse grid, for the keyframes alone. Last,
+a few evaluations on the full grid are enough. Long timelines are cut at keyframes into spans; each begins
+with the fluid at the end of the one before.
 """
 
 from __future__ import annotations
@@ -25,9 +26,10 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.state import State
 from wfluid.gradient.functional import EvaluationTimes, Functional
+from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.objectives import Effort
 from wfluid.gradient.variables import Free
-from wfluid.keyframes.way_misfit import NOTHING, WayMisfit
+from wfluid.keyframes.way_misfit import NOTHING, WayMisfit, longest
 from wfluid.keyframes.ways import Way
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
@@ -41,33 +43,33 @@ MARCH_WEIGHT, WEIGHT = 1e-3, 1e-4
 """Weight of effort and smoothness: in the march, and then to begin with."""
 
 LOWER, LEAST_WEIGHT = 0.1, 1e-8
-"""The factor that lowers it, and where that ends."""
+"""The factor that lowers the weight, and the least weight."""
 
 EVALUATIONS = {MARCH: 25, COARSE: 30, FINE: 15}
-"""Most evaluations of a minimisation; a march has one a window."""
+"""Largest number of evaluations of a minimisation; a march has one minimisation for each window."""
 
 CHANGE = {MARCH: 1e-2, COARSE: 1e-3, FINE: 1e-3}
-"""Relative decrease at which it ends."""
+"""Relative decrease at which a minimisation ends."""
 
 ROUNDS = {COARSE: 12, FINE: 8}
-"""Most minimisations of a stage."""
+"""Largest number of minimisations of a stage."""
 
 NEAR = {COARSE: 0.5, FINE: 0.4}
-"""Parts of the tolerance: misfits of keyframes at which a stage ends; a march is led by more than these."""
+"""Misfit of keyframes at which a stage ends, as a fraction of the tolerance; not for a march."""
 
 NEAR_ENOUGH = 0.5
-"""Part of the tolerance: misfit at which the weight needs no lowering."""
+"""Misfit at which the weight is not lowered, as a fraction of the tolerance."""
 
 NOISE = 1e-6
-"""Relative, of values computed in single precision."""
+"""Relative noise of values computed in single precision."""
 
 MEMORY = 20
-"""Pairs that the optimiser keeps: little beside a run, and many of the few directions there are."""
+"""Pairs that the optimiser keeps: cheap beside a run, and many for the few free numbers."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a search is."""
+    """Progress of a search."""
 
     stage: str
     """"march", "coarse" or "fine"."""
@@ -76,63 +78,63 @@ class Progress:
     evaluations: int
     """Runs with their gradients so far."""
     value: float
-    """What this stage minimises: phi, and what effort and smoothness weigh."""
+    """The objective of this stage: phi, with weighted effort and smoothness."""
     worst: float
-    """The longest misfit of a keyframe in this stage's time [longer side]."""
+    """Longest misfit of a keyframe within the time of this minimisation [longer side]."""
 
 
 class Stopped(Exception):
-    """The search was told to stop; its best so far is in it."""
+    """The search was stopped by the caller; it keeps its best forces."""
 
 
 @dataclass
 class SearchLog:
-    """What a search has done."""
+    """Iterations, evaluations and times of a search."""
 
     heed: Callable[[Progress], object] = lambda progress: None
-    """Told of every iteration; what it returns, if true, stops the search."""
+    """Called after every iteration; a true result stops the search."""
     history: list[Progress] = field(default_factory=list)
     """Every iteration."""
     evaluations: int = 0
     """Runs with their gradients."""
     seconds: EvaluationTimes = field(default_factory=EvaluationTimes)
-    """Where their time went."""
+    """Time spent on them."""
 
 
 @dataclass(frozen=True, eq=False)
 class TimeSpan:
-    """A stretch of time between keyframes, with forces of its own."""
+    """A span of time between keyframes, with its own forces."""
 
     ways: Sequence[Way]
-    """Of all points."""
+    """Planned ways of all points."""
     edges: Sequence[int]
     """Steps at which its windows begin and end."""
     forces: Sequence[GaussianForce]
     """The forces to begin with, point by point, in the order of their windows."""
     windows: Sequence[int]
-    """The window of each; -1 for one that a march leaves alone."""
+    """Window of each force; -1 for forces that a march does not change."""
     owners: Sequence[int]
-    """The point of each."""
+    """Index of the point of each force."""
     guided: Sequence[bool]
-    """Which points are led along their ways."""
+    """Whether each point is guided along its way in a march."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What moves beside the forces that are sought."""
+    """Everything that all spans share: fluid, given forces, timeline, device."""
 
     fluid: Fluid
-    """What the picture is made of."""
+    """The fluid."""
     given: Sequence[Force]
-    """Forces that are the user's."""
+    """The user's forces."""
     free: Sequence[Free]
-    """What of the user's forces may vary."""
+    """Numbers of the user's forces that may vary."""
     timeline: Timeline
-    """Its steps."""
+    """The timeline of the animation."""
     device: str | None
-    """Where it is computed."""
-    captured: dict[Grid, Functional]
-    """The last functional on each grid: the next one takes over its graphs, if it can."""
+    """Name of the device."""
+    graphs: GraphCache
+    """Captured graphs, which one minimisation takes over from the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,15 +144,15 @@ class GridStart:
     grid: Grid
     """The grid."""
     begin: tuple[float, State] | None
-    """When the span begins, and with what; None at rest."""
+    """Time at which the span begins [s] and the state then; None at rest."""
     points: np.ndarray
-    """Where the points are then [longer side], (n, 2)."""
+    """Positions of the points then [longer side], (n, 2)."""
 
 
 class Search:
-    """Finds the forces of one span.
+    """The search for the forces of one span.
 
-    It holds the best forces so far in `given` and `forces`, whatever ends it.
+    `given` and `forces` are the best forces so far, however the search ends.
     """
 
     def __init__(self, scene: Problem, span: TimeSpan, tolerance: float, log: SearchLog):
@@ -165,16 +167,16 @@ class Search:
         ]
         self._typical_effort = float(np.mean(typical)) if typical else 1.0
         self._weight = WEIGHT
-        self._lures: dict[float, np.ndarray] = {}
+        self._multipliers: dict[float, np.ndarray] = {}
 
     given: tuple[Force, ...]
     """The user's forces."""
     forces: tuple[GaussianForce, ...]
-    """The forces sought."""
+    """The forces that are searched for."""
 
     @staticmethod
     def _scale(force: GaussianForce) -> float:
-        """The strength that moves a point by a radius within two windows; pressure takes half of it."""
+        """The strength that moves a point by a radius within two windows; projection removes half of it."""
         window = force.envelope.end - force.envelope.start
         return 2 * force.radius / window**2
 
@@ -196,21 +198,23 @@ class Search:
     ) -> float:
         """Minimise over all windows; the longest misfit of a keyframe [longer side].
 
-        While keyframes are missed, the miss is added to the aim: the method of multipliers (Nocedal & Wright,
-        17.3). Where that does not halve it, the weight is lowered too. `corrections` move the places of
-        keyframes by time, (n, 2) [longer side].
+        After each minimisation the misfits are subtracted from the aims: the method of multipliers (Nocedal &
+        Wright, 17.3). If that does not halve the longest misfit, the weight is lowered too. `corrections` are
+        added to the destinations of keyframes, by time, (n, 2) [longer side].
         """
         edges, before = self._span.edges, math.inf
         for _ in range(ROUNDS[stage]):
-            worst, left = self._minimise(stage, level, (edges[0], edges[-1]), self._all_free(), corrections)
+            worst, misfits = self._minimise(
+                stage, level, (edges[0], edges[-1]), self._all_free(), corrections
+            )
             if worst <= NEAR_ENOUGH * self._tolerance:
                 break
             lower = 1.0 if worst < 0.5 * before else LOWER
             if self._weight * lower < LEAST_WEIGHT:
                 break
             self._weight, before = self._weight * lower, worst
-            for t, by in left.items():
-                self._lures[t] = (self._lures.get(t, 0.0) - by) * lower
+            for t, by in misfits.items():
+                self._multipliers[t] = (self._multipliers.get(t, 0.0) - by) * lower
         return worst
 
     def after(self, level: GridStart, step: int | None = None) -> GridStart:
@@ -241,7 +245,7 @@ class Search:
         self, level: GridStart, last: int, journey: WayMisfit, free: Sequence[Free], weight: float
     ) -> Functional:
         scene, edges = self._scene, self._span.edges
-        functional = Functional(
+        return Functional(
             level.grid,
             scene.fluid,
             (*self.given, *self.forces),
@@ -251,14 +255,12 @@ class Search:
             begin=level.begin,
             end=self._time_of(last),
             device=scene.device,
-            like=scene.captured.get(level.grid),
+            graphs=scene.graphs,
             room=self._time_of(edges[-1]) - self._time_of(edges[0]),
         )
-        scene.captured[level.grid] = functional
-        return functional
 
     def _moments(self, first: int, last: int) -> list[float]:
-        """Times of keyframes in a stretch; between them ends and middles of windows."""
+        """Times at which misfits count: keyframes, and ends and middles of windows between them."""
         edges = self._span.edges
         steps = {*edges, *((a + b) // 2 for a, b in pairwise(edges)), *self.keyed_steps}
         return [self._time_of(step) for step in sorted(steps) if first < step <= last]
@@ -271,30 +273,28 @@ class Search:
         free: Sequence[Free],
         corrections: Mapping[float, np.ndarray] = NOTHING,
     ) -> tuple[float, Mapping[float, np.ndarray]]:
-        """Minimise over what is free, keeping the best; the longest misfit, and all, of keyframes."""
+        """Minimise over the free numbers, keep the best point; the longest and all keyframe misfits."""
         log, span = self._log, self._span
         moments, marches = self._moments(*steps), stage == MARCH
         guided = span.guided if marches else ()
-        multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._lures, self._weight)
+        multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._multipliers, self._weight)
         journey = WayMisfit(span.ways, level.points, moments, self._unit, guided, corrections, multipliers)
         functional = self._functional(level, steps[1], journey, free, weight)
         smooth = Smoothness(self._chains(functional), weight)
-        done, stopped, seen = log.evaluations, False, {}
+        done, stopped = log.evaluations, False
 
-        def evaluate(m: np.ndarray) -> tuple[float, np.ndarray]:
+        def evaluate(m: np.ndarray) -> tuple[float, np.ndarray, Mapping[float, np.ndarray]]:
             try:
-                value, gradient = functional.value_and_gradient(m)
+                found = functional.evaluate(m)
             except ValueError as error:  # a force beyond the limit
                 raise FloatingPointError(str(error)) from error
-            seen[m.tobytes()] = journey.worst, dict(journey.left)
-            return smooth.added(value, gradient, m)
+            return *smooth.added(found.value, found.gradient, m), journey.misfits(found.places)
 
         def heed(at: Iterate) -> bool:
             nonlocal stopped
             log.evaluations = done + at.evaluations
-            progress = Progress(
-                stage, len(log.history) + 1, log.evaluations, at.value, seen[at.x.tobytes()][0]
-            )
+            (misfits,) = at.point.details
+            progress = Progress(stage, len(log.history) + 1, log.evaluations, at.value, longest(misfits))
             log.history.append(progress)
             stopped = bool(log.heed(progress))
             near = not marches and progress.worst <= NEAR[stage] * self._tolerance
@@ -315,7 +315,10 @@ class Search:
         self.given, self.forces = forces[: len(self.given)], forces[len(self.given) :]
         if stopped:
             raise Stopped
-        return seen.get(minimum.x.tobytes(), (math.inf, {}))
+        if not minimum.point.details:
+            return math.inf, {}  # not even the start could be evaluated
+        (misfits,) = minimum.point.details
+        return longest(misfits), misfits
 
     def _chains(self, functional: Functional) -> list[Chain]:
         """The entries of each point's forces that vary, in the order of their windows."""
@@ -332,17 +335,17 @@ class Search:
 
 
 Chain = tuple[np.ndarray, np.ndarray]
-"""Entries of a vector, a row a force, and where they are expected."""
+"""Indices of entries of a vector, a row for each force, and their expected values."""
 
 
 class Smoothness:
-    """Half the squares of changes, from row to row, of how far entries are from what is expected."""
+    """Half the sum of squared changes, from row to row, of entries minus their expected values."""
 
     def __init__(self, chains: Sequence[Chain], weight: float):
         self._chains, self._weight = chains, weight
 
     def added(self, value: float, gradient: np.ndarray, m: np.ndarray) -> tuple[float, np.ndarray]:
-        """A value and its gradient at m, with this and its, times the weight."""
+        """A value and its gradient at m, with the weighted smoothness and its gradient added."""
         gradient = gradient.copy()
         for entries, expected in self._chains:
             change = np.diff(m[entries] - expected, axis=0)

@@ -1,8 +1,8 @@
-"""The objective of keyframes: how far particles are from where they should be, at the time.
+"""The objective of a keyframe search: the misfits of particles from their keyframes and ways.
 
 phi = 1/2 sum over keyframe times of ||q - K||^2 (Bonilla & Velho, section III), in units of a force's
-radius squared. In a march misfits from the expected ways count too, at some times between: they lead it round
-what it could not pass.
+radius squared. In a march, misfits from the planned ways count too at times between keyframes; they lead
+particles around others and walls.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from wfluid.gradient.objectives import ParticleObjective
 from wfluid.keyframes.ways import Way
 
 SAME_TIME = 1e-9
-"""Times nearer than this are one [s]."""
+"""Times that differ by less are the same [s]."""
 
 NOTHING: Mapping[float, np.ndarray] = MappingProxyType({})
-"""No shifts."""
+"""No corrections and no multipliers."""
 
 HOLD = 0.3
 """Weight of a pin's misfits between keyframes."""
 
 
 class WayMisfit(ParticleObjective):
-    """Misfits of particles on their ways.
+    """Misfits of particles from their keyframes and ways.
 
     `points` are places at the beginning of the run. Between keyframes pins are held, and points may be led
     along their ways.
@@ -67,19 +67,24 @@ class WayMisfit(ParticleObjective):
             self._led[t] = np.where(self._held[t] > 0, 0.0, led * under_way)
         self._places = {t: aims + corrections.get(t, 0.0) for t, aims in self._aims.items()}
         self._aims = {t: place + multipliers.get(t, 0.0) for t, place in self._places.items()}
-        self.left: dict[float, np.ndarray] = {}
-
-    left: dict[float, np.ndarray]
-    """What keyframes are missed by in the last evaluation, by time: (n, 2) [longer side], 0 for others."""
 
     def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
         """Half the weighted sum of squares, and the weighted misfits."""
-        self.left[t] = np.where(self._keyed[t][:, None] > 0, places - self._places[t], 0.0)
-        left = places - self._aims[t]
-        slope = ((self._held[t] + self._led[t]) / self._unit**2)[:, None] * left
-        return 0.5 * float(np.sum(slope * left)), slope
+        misfit = places - self._aims[t]
+        slope = ((self._held[t] + self._led[t]) / self._unit**2)[:, None] * misfit
+        return 0.5 * float(np.sum(slope * misfit)), slope
 
-    @property
-    def worst(self) -> float:
-        """The longest misfit of a keyframe in the last evaluation [longer side]."""
-        return max(float(np.linalg.norm(left, axis=1).max()) for left in self.left.values())
+    def misfits(self, places: Mapping[float, np.ndarray]) -> dict[float, np.ndarray]:
+        """Misfits of keyframes for positions of all particles, both by time: (n, 2) [longer side].
+
+        They are 0 for particles that have no keyframe at the time.
+        """
+        return {
+            t: np.where(self._keyed[t][:, None] > 0, found - self._places[t], 0.0)
+            for t, found in places.items()
+        }
+
+
+def longest(misfits: Mapping[float, np.ndarray]) -> float:
+    """The length of the longest misfit [longer side]."""
+    return max(float(np.linalg.norm(misfit, axis=1).max()) for misfit in misfits.values())

@@ -1,9 +1,9 @@
-"""The first guess of keyframes: ways that keep apart, and forces along them.
+"""The start of a keyframe search: ways that keep apart, and forces along them.
 
-A point's way is a straight line, bent to one side where it would come near another's or a wall: of two
-points that change places on straight lines, each is as well sent round one way as the other, and the
-gradient, which must choose, is 0. Forces are Gaussians at the places where the points are expected, in
-windows of time that all points share, as wide as the points' distance allows: wide ones deform least.
+A point's way is a straight line, bent to one side where it would come near another way or a wall. Without
+the bend, two points that change places could pass each other on either side, and the gradient between the two
+is 0. Forces are Gaussians at the expected positions of the points, in windows of time that all points share,
+as wide as the distance of the points allows: wide forces deform the picture least.
 """
 
 from __future__ import annotations
@@ -21,41 +21,41 @@ from wfluid.keyframes.keyframes import PointTarget
 from wfluid.model.gaussian_forces import GaussianForce
 
 BENDS = (0.0, 0.1, 0.25, 0.4, 0.55, 0.7)
-"""How far ways may bend, in parts of their length; the least that keeps them apart is taken."""
+"""Bends that are tried, as fractions of a way's length; the least that keeps ways apart is taken."""
 
 APART = 0.75
-"""Part of their distance at the ends that ways should keep between them."""
+"""Distance that ways should keep, as a fraction of their distance at the ends."""
 
 WALL_ROOM = 0.01
-"""Distance to a wall that is as good as none [longer side]: ways of points near walls may come nearer."""
+"""Added to distances from walls [longer side], so that ways of points near a wall may come nearer to it."""
 
 WIDEST, NARROWEST = 0.12, 0.006
 """Radii of forces [longer side]."""
 
 OF_SPACING = 0.5
-"""Radius of a force in parts of the least distance to another point's way."""
+"""Radius of a force, as a fraction of the least distance to another point's way."""
 
 LEAST_WINDOWS = 5
-"""Windows of the time to the last keyframe, at least."""
+"""Least number of windows until the last keyframe."""
 
 LEAST_STEPS = 2
-"""Steps of a window, at least."""
+"""Least number of steps of a window."""
 
 SAMPLES = 33
-"""Moments at which ways are compared, between two keyframes."""
+"""Number of times between two keyframes at which ways are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Where a particle is expected."""
+    """The planned way of a particle."""
 
     particle: PointTarget
-    """Whose it is."""
+    """The particle and its keyframes."""
     bend: float
-    """How far it bends to its left, in parts of the length between two keyframes."""
+    """Bend to the left, as a fraction of the distance between two keyframes."""
 
     def at(self, t: float | np.ndarray) -> np.ndarray:
-        """Where it is expected at a time [longer side], (…, 2); after the last keyframe, where that is."""
+        """Planned position at a time [longer side], (…, 2); after the last keyframe, its destination."""
         t = np.asarray(t, dtype=np.float64)
         out = np.broadcast_to(self.particle.point, (*t.shape, 2)).copy()
         for n, (start, end, a, b) in enumerate(self._legs()):
@@ -69,7 +69,7 @@ class Way:
         return out
 
     def length(self, start: float, end: float) -> float:
-        """How long it is between two times [longer side]."""
+        """Length between two times [longer side]."""
         places = self.at(np.linspace(start, end, SAMPLES))
         return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
@@ -82,9 +82,9 @@ class Way:
 
 
 def plan_ways(particles: Sequence[PointTarget], extent: tuple[float, float], seed: int) -> list[Way]:
-    """Ways that keep apart from one another and from the walls, as well as bends can do it.
+    """Ways that keep apart from one another and from walls, as far as bends achieve that.
 
-    Which side they bend to is the seed's choice, if both are as good.
+    The seed chooses the side to bend to, if both are equally good.
     """
     side = 1.0 if np.random.default_rng(seed).random() < 0.5 else -1.0
     best, widest = [], -math.inf
@@ -100,7 +100,7 @@ def plan_ways(particles: Sequence[PointTarget], extent: tuple[float, float], see
 
 
 def _room(ways: Sequence[Way], extent: tuple[float, float]) -> float:
-    """The least distance between two ways at one time, or to walls, in parts of that at their ends."""
+    """The least distance between two ways at one time, or to walls, relative to that at their ends."""
     times, room = _moments(ways), 1.0
     places = [way.at(times) for way in ways]
     stops = [np.searchsorted(times, [0.0, *way.particle.times]) for way in ways]
@@ -115,7 +115,7 @@ def _room(ways: Sequence[Way], extent: tuple[float, float]) -> float:
 
 
 def _moments(ways: Sequence[Way]) -> np.ndarray:
-    """Moments of all keyframes, and some between."""
+    """Times of all keyframes, and some between."""
     stops = sorted({0.0, *(t for way in ways for t in way.particle.times)})
     return np.unique(np.concatenate([np.linspace(a, b, SAMPLES) for a, b in pairwise(stops)]))
 

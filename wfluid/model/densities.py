@@ -16,7 +16,7 @@ from wfluid.model.painted import VISCOSITY_LIMIT, Painted
 
 LOOKS = ("ink", "smoke")
 
-RATE_LIMIT = 1e6
+SOURCE_RATE_LIMIT = 1e6
 """Most that a source may pour [1/s]."""
 
 
@@ -40,8 +40,8 @@ class Source:
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Source.center", self.center))
         finite("Source.rate", self.rate)
-        if not abs(self.rate) <= RATE_LIMIT:
-            raise ValueError(f"Source.rate {self.rate:g}: the limit is {RATE_LIMIT:g}/s")
+        if not abs(self.rate) <= SOURCE_RATE_LIMIT:
+            raise ValueError(f"Source.rate {self.rate:g}: the limit is {SOURCE_RATE_LIMIT:g}/s")
         check_radius("Source.radius", self.radius)
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:

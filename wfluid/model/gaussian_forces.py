@@ -20,7 +20,7 @@ from wfluid.model.force import (
 )
 from wfluid.model.painted import Painted
 
-RATE_LIMIT = 100.0
+GROWTH_RATE_LIMIT = 100.0
 """Largest prescribed divergence the solver is tested with [1/s]."""
 
 STEP_GROWTH = 0.5
@@ -138,8 +138,8 @@ class Growth(LocalForce):
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Growth.center", self.center))
         check_radius("Growth.radius", self.radius)
-        if not abs(self.rate) <= RATE_LIMIT:
-            raise ValueError(f"growth of {self.rate:g}/s: the limit is {RATE_LIMIT:g}/s")
+        if not abs(self.rate) <= GROWTH_RATE_LIMIT:
+            raise ValueError(f"growth of {self.rate:g}/s: the limit is {GROWTH_RATE_LIMIT:g}/s")
         if isinstance(self.envelope, Instantaneous):
             raise ValueError("a growth takes time: give it a window instead of an instant")
 

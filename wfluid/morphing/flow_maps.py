@@ -1,8 +1,8 @@
 """A flow's maps between any of its times and its two ends.
 
-`source_of` the start is what the solver carries. The way to the end is found going back: against every
-step's own velocity the displacement to the end is carried from the last step to the first. Both follow the
-same velocities by the same rule, so that one map undoes the other but for what interpolation loses.
+The solver itself carries the map to the start. The map to the end is computed backward: the displacement to
+the end is carried against each step's own velocity, from the last step to the first. Both use the same
+velocities and the same scheme, so that one map inverts the other up to interpolation errors.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from wfluid.view.coordinate_map import CoordinateMap
 
 @dataclass(frozen=True, eq=False)
 class FlowMaps:
-    """What lies at the start, and at the end, for every place at every step of a flow."""
+    """Maps of a flow to its start and to its end, at every step."""
 
     grid: Grid
     """The grid of the maps."""
     walls: Walls
-    """How they go on beyond its edges."""
+    """The walls, which say how the maps continue beyond the edges."""
     from_start: np.ndarray
     """Place at the start minus the place itself [longer side], (steps + 1, ny, nx, 2), float32."""
     to_end: np.ndarray
     """Place at the end minus the place itself, the same."""
 
     def since_start(self, part: float | np.ndarray) -> CoordinateMap:
-        """Places at the start of what is there after a part of the time, 0 … 1, or one a cell (ny, nx)."""
+        """The map to the start after a fraction of the time, 0 … 1: one number, or (ny, nx)."""
         return CoordinateMap(self.grid, self.walls, _between(self.from_start, part))
 
     def until_end(self, part: float | np.ndarray) -> CoordinateMap:
-        """Places at the end of what is there after a part of the time, 0 … 1, or one a cell (ny, nx)."""
+        """The map to the end after a fraction of the time, 0 … 1: one number, or (ny, nx)."""
         return CoordinateMap(self.grid, self.walls, _between(self.to_end, part))
 
     def inconsistency(self) -> np.ndarray:
-        """How far from itself a cell's centre comes that goes to the end and back [longer side], (ny, nx)."""
+        """Distance from each cell's centre to its image under both maps [longer side], (ny, nx)."""
         there, back = self.until_end(0.0), self.since_start(1.0)
         ends = there.source_of.reshape(-1, 2)
         extent = np.array([self.grid.width, self.grid.height])
@@ -54,7 +54,7 @@ class FlowMaps:
 
 
 def _between(maps: np.ndarray, part: float | np.ndarray) -> np.ndarray:
-    """The displacement after a part of the time, on the line between those of the steps around."""
+    """The displacement after a fraction of the time, interpolated linearly between steps."""
     steps = len(maps) - 1
     at = np.clip(np.asarray(part, dtype=np.float64), 0.0, 1.0) * steps
     step = np.minimum(at.astype(int), steps - 1)

@@ -13,10 +13,10 @@ from wfluid.view.quality import MapQuality
 class MorphFrame(Frame):
     """A frame of a morph: `map` and `quality` are those of the first picture.
 
-    `points` are the keyframes' points, but with a timing mask, by which they have no one place.
+    `points` are the keyframes' points; none with a timing mask, where a point has no single place.
     """
 
     to_map: CoordinateMap | None = None
-    """Where in the second picture, stretched over the frame, its colours come from."""
+    """Backward map into the second picture, which is stretched over the frame."""
     to_quality: MapQuality | None = None
-    """What that map does to the second picture."""
+    """Measures of that map."""

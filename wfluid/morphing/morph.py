@@ -24,7 +24,7 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.run import Run, RunTimes
-from wfluid.domain.curves import DELAY, EASE, local
+from wfluid.domain.curves import DELAY, EASE, delayed_part
 from wfluid.domain.operators import blurred
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -44,20 +44,20 @@ from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.quality import MapQuality, measure_map
 
 FLOW = Timeline(1.0, fps=24.0, substeps=2)
-"""The flow's own time: a morph's frames are at parts of it, however long the morph is shown."""
+"""Timeline of the flow; the frames of a morph of any duration are spread over it."""
 
 VISCOSITY = 0.03
-"""Of a morph's fluid where none is given [longer side^2/s]: what lies around points goes with them, so that
-features keep their shape."""
+"""Default viscosity of a morph's fluid [longer side^2/s]: high, so that features around points move with them
+and keep their shape."""
 
 FACTORS = (0.5, 1.0, 0.35)
-"""On the radii of forces: the viscosity carries their motion wide enough."""
+"""Factors on the radii of forces, smaller than usual: the viscosity spreads their motion."""
 
 TOLERANCE = 0.5 / 512
-"""Residual that is good enough for a morph [longer side]."""
+"""Default tolerance of residuals of a morph [longer side]."""
 
 LEAST_JACOBIAN = 0.1
-"""Least det J that a timing mask may leave a map; a flow that leaves less is not to blame on it."""
+"""Least det J of a map with a timing mask, unless the flow has less without the mask."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,14 +127,14 @@ class Morph:
         return index / (self.settings.timeline.frames - 1)
 
     def _warped(self, index: int, ahead: np.ndarray | None) -> np.ndarray:
-        """The part of the flow's time that a frame shows: one number, or (ny, nx)."""
+        """The fraction of the flow's time that a frame shows: a number, or (ny, nx)."""
         part, settings = self._part(index), self.settings
-        far = settings.warp_curve.at(part if ahead is None else local(part, ahead, settings.delay))
+        far = settings.warp_curve.at(part if ahead is None else delayed_part(part, ahead, settings.delay))
         return np.interp(far, self._ways, np.linspace(0.0, 1.0, len(self._ways)))
 
     @cached_property
     def _ways(self) -> np.ndarray:
-        """The part of their ways, all together, that points have behind them after each step, 0 … 1."""
+        """The fraction of the summed ways of all points that is covered after each step, 0 … 1."""
         steps = np.linalg.norm(np.diff(self.match.tracks, axis=0), axis=2).sum(axis=1)
         if not steps.any():
             steps[:] = 1.0
@@ -142,7 +142,7 @@ class Morph:
         return np.append(0.0, far / far[-1])
 
     def _points(self, part: float) -> np.ndarray:
-        """Where the keyframes' points are after a part of the flow's time [longer side], (n, 2)."""
+        """Positions of the keyframes' points after a fraction of the flow's time [longer side], (n, 2)."""
         tracks = self.match.tracks
         at = part * (len(tracks) - 1)
         step = min(int(at), len(tracks) - 2)
@@ -172,7 +172,7 @@ class Morph:
                 pictures.append(look_up.untouched if still else look_up.render(state.d_x, state.d_y))
                 lookup += clock() - looked
             own = self._part(index)
-            weight = settings.blend_curve.at(own if mask is None else local(own, mask, settings.delay))
+            weight = settings.blend_curve.at(own if mask is None else delayed_part(own, mask, settings.delay))
             picture = blended(*pictures, weight, settings.blend)
             seconds.lookup += lookup
             seconds.simulate += clock() - began - lookup
@@ -189,16 +189,16 @@ class Morph:
             )
 
     def residuals_of_b(self) -> np.ndarray:
-        """How far from its point of the second picture each keyframe sees it at the start [px of it]."""
+        """Residual of each keyframe in the second picture, by the map at the start [px of that picture]."""
         arrivals, animation = self.match.arrivals, self.animation
         points = np.array([arrival.keyframe.point for arrival in arrivals])
         wanted = np.array([arrival.keyframe.destination for arrival in arrivals])
-        left = self.passage.until_end(0.0).source_at(points) - wanted
+        residual = self.passage.until_end(0.0).source_at(points) - wanted
         grid = animation.grid
-        return np.linalg.norm(left * self.pair.window.pixels((grid.width, grid.height)), axis=1)
+        return np.linalg.norm(residual * self.pair.window.pixels((grid.width, grid.height)), axis=1)
 
     def inconsistency_px(self) -> tuple[float, float]:
-        """How far the two maps are from undoing one another, mean and greatest [px of the first picture]."""
+        """Mean and largest error with which the two maps invert each other [px of the first picture]."""
         picture = self.animation.picture
         found = self.passage.inconsistency() * max(picture.width, picture.height)
         return float(found.mean()), float(found.max())

@@ -15,24 +15,25 @@ from wfluid.pictures.blend import check_light
 
 @dataclass(frozen=True)
 class MorphSettings:
-    """How a morph goes.
+    """Timing, curves and blending of a morph.
 
     Raises:
-        ValueError: no such curve or light, keys of a curve outside the duration, a delay outside 0 … 0.9.
+        ValueError: an unknown curve or space to blend in, keys of a curve outside the duration, or a delay
+            outside 0 … 0.9.
     """
 
     timeline: Timeline
     """When frames are shown; the first is the one picture, the last the other."""
     warp_curve: str | Curve | Mapping[float, float] = EASE
-    """How far points are on their ways: "linear", "ease", or values 0 … 1 by time [s]."""
+    """Fraction of their ways that points have covered: "linear", "ease", or values 0 … 1 by time [s]."""
     blend_curve: str | Curve | Mapping[float, float] = EASE
-    """How much of the second picture is seen, the same."""
+    """Weight of the second picture in the blend, given in the same way."""
     blend: str = "linear"
-    """What is mixed: "linear" light, or "display" values."""
+    """Space to blend in: "linear" light or "display" values."""
     mask: Painted | np.ndarray | None = None
-    """A mask, white where it happens first."""
+    """Timing mask, 1 (white) where the morph happens first."""
     delay: float = DELAY
-    """How much later it happens where the mask is black, a part of the time."""
+    """Delay where the mask is black, a fraction of the duration."""
     reverse: bool = False
     """From the second picture to the first: the same frames, the last one first."""
     pingpong: bool = False

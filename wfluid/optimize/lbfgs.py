@@ -64,7 +64,8 @@ LEAST_CURVATURE = float(np.finfo(np.float64).eps)
 PATIENCE = 10
 """Iterations that may pass without a lower value or a smaller gradient than all before."""
 
-Function = Callable[[np.ndarray], tuple[float, np.ndarray]]
+Function = Callable[[np.ndarray], tuple]
+"""Of x: the value and the gradient there; what it returns beyond is kept as the point's `details`."""
 
 
 class Status(Enum):
@@ -123,6 +124,8 @@ class Point:
     x: np.ndarray
     value: float
     gradient: np.ndarray
+    details: tuple = ()
+    """Whatever else the function returned there."""
 
     @property
     def is_finite(self) -> bool:
@@ -386,13 +389,13 @@ class _Counted:
     def _evaluate(self, x: np.ndarray) -> Point:
         """Evaluate on copies, so that neither side can change what the other holds."""
         try:
-            value, gradient = self.value_and_gradient(x.copy())
+            value, gradient, *details = self.value_and_gradient(x.copy())
         except FloatingPointError:
-            value, gradient = math.nan, np.full(x.shape, math.nan)
+            value, gradient, details = math.nan, np.full(x.shape, math.nan), []
         gradient = np.array(gradient, dtype=np.float64)
         if gradient.shape != x.shape:
             raise ValueError(f"the gradient has shape {gradient.shape}, the start {x.shape}")
-        return Point(_frozen(x), float(value), _frozen(gradient))
+        return Point(_frozen(x), float(value), _frozen(gradient), tuple(details))
 
 
 def _vector(start: Any) -> np.ndarray:

@@ -34,7 +34,7 @@ from wfluid.step.forcing import Forcing
 from wfluid.step.projection import Projection
 from wfluid.system.threads import ThreadTeam, free_cores, helpers
 
-STRIPS = 2
+STEP_THREADS = 2
 """Threads that share a step on a CPU: more wait for memory."""
 
 SHARED_CELLS = 300 * 300
@@ -115,8 +115,8 @@ class Step:
         """
         work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.medium else 1)
         least = SHARED_ALONE if alone else SHARED_CELLS
-        shared = not self.device.is_cuda and free_cores() >= STRIPS and work >= least
-        return helpers(STRIPS if shared else 1)
+        shared = not self.device.is_cuda and free_cores() >= STEP_THREADS and work >= least
+        return helpers(STEP_THREADS if shared else 1)
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
         """Make ready for a step of dt that ends at t; how its solves will go.

@@ -27,8 +27,8 @@ _PROGRAMS = {
     "lanczos": lookup.look_up_lanczos,
 }
 
-STRIPS = 8
-"""Most threads that share a look-up."""
+LOOKUP_THREADS = 8
+"""Largest number of threads that share a look-up."""
 
 QUAD = 4
 """Channels that are looked up at once."""
@@ -146,7 +146,7 @@ class LookUp:
         """Compute the coordinates and pixels of `render`, left in device memory."""
         self.stretch(d_x, d_y)
         if self._replay is None:
-            threads = 1 if self.device.is_cuda else min(free_cores(), STRIPS)
+            threads = 1 if self.device.is_cuda else min(free_cores(), LOOKUP_THREADS)
             self._replay = CapturedGraph(self.device, self._look_up, helpers(threads))
         self._replay.launch()
 
