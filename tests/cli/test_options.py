@@ -6,7 +6,7 @@ from scenes import write_pictures
 from wfluid.cli.main import main
 from wfluid.cli.options import scene_of_options
 from wfluid.cli.parser import build_parser
-from wfluid.scene.format import FORCES
+from wfluid.scene.forces import FORCES
 from wfluid.scene.short_forms import parse_density, parse_force
 
 SHORT = {
@@ -47,10 +47,10 @@ def test_a_short_form_is_the_table_it_means(kind):
     text, table = SHORT[kind]
     found = parse_force(kind, text)
     assert found == {"kind": kind, **table} and next(iter(found)) == "kind"
-    assert set(SHORT) == set(FORCES) - {"buoyancy"}
+    assert set(SHORT) == set(FORCES.tables) - {"buoyancy"}
 
 
-@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in SHORT for key in FORCES[kind].keys])
+@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in SHORT for key in FORCES.tables[kind].keys])
 def test_an_option_of_a_short_form_is_the_key_of_its_name(kind, key):
     """But for what has no short form, or was said before."""
     text, table = SHORT[kind]
@@ -59,7 +59,7 @@ def test_an_option_of_a_short_form_is_the_key_of_its_name(kind, key):
             parse_force(kind, f"{text}:{key}=1")
         return
     written, meant = next(
-        OPTIONS[type_] for type_ in OPTIONS if FORCES[kind].keys[key].type.startswith(type_)
+        OPTIONS[type_] for type_ in OPTIONS if FORCES.tables[kind].keys[key].type.startswith(type_)
     )
     found = parse_force(kind, f"{text}:{key}={written}")
     assert found == {"kind": kind, **table, key: meant} and type(found[key]) is type(meant)

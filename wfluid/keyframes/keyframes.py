@@ -11,9 +11,6 @@ import numpy as np
 
 from wfluid.domain.paths import Place
 
-TOLERANCE = 0.25 / 512
-"""Residual that is good enough [longer side]: a quarter of a pixel of a picture of 512."""
-
 COINCIDENT = 1e-6
 """Places nearer than this are one [longer side]."""
 

@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
+from wfluid.domain.limits import INK, LOOKS, VISCOSITY_LIMIT
 from wfluid.domain.paths import Center, as_center, place_at
 from wfluid.domain.piecewise import finite
 from wfluid.model.force import GaussianImpulse, check_radius, impulse_slopes, shape_slopes
-from wfluid.model.painted import VISCOSITY_LIMIT, Painted
-
-LOOKS = ("ink", "smoke")
+from wfluid.model.painted import Painted
 
 RATE_LIMIT = 1e6
 """Most that a source may pour [1/s]."""
@@ -85,7 +84,7 @@ class Density:
     """What is there at the beginning; nothing by default."""
     sources: Sequence[Source | PaintedSource] = ()
     """S: what is poured in."""
-    color: tuple[float, float, float] = (0.02, 0.02, 0.08)
+    color: tuple[float, float, float] = INK
     """Its colour, red, green, blue, 0 … 1 in linear light."""
     look: str = "ink"
     """"ink" lets through color^rho of the light, "smoke" covers 1 - exp(-rho) of what is behind."""

@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.domain.limits import CYCLES, SCHEMES, SOLVERS, VISCOSITY
 from wfluid.domain.walls import Wall, Walls
 from wfluid.model.densities import Density
 from wfluid.model.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
-
-SCHEMES = ("standard", "paper")
-SOLVERS = ("multigrid", "jacobi")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +21,7 @@ class Fluid:
         ValueError: a value outside its range, with the range.
     """
 
-    viscosity: Quantity | np.ndarray = 0.001
+    viscosity: Quantity | np.ndarray = VISCOSITY
     """Kinematic viscosity mu [longer side^2/s], 0 … 1000: a number (the paper's figure 2: 0.001 …
     0.005), an array (height, width) of any size over the picture, a `Painted` picture, `Keyed` ones, or
     a function of the time [s] that gives any of these."""
@@ -36,12 +34,12 @@ class Fluid:
     walls: Walls | str = field(default_factory=Walls)
     """Condition at the picture's edges: a `Walls`, or "free-slip", "no-slip", "periodic" or two of
     them as "x,y"."""
-    scheme: str = "standard"
+    scheme: str = SCHEMES[0]
     """"standard": midpoint traces, cubic interpolation; "paper": Euler traces, bilinear interpolation
     and Jacobi solves, to reproduce it."""
     solver: str | None = None
     """"multigrid" (the standard scheme's default) or "jacobi" (the paper's)."""
-    pressure_cycles: int = 3
+    pressure_cycles: int = CYCLES
     """Multigrid cycles a projection: 3 leave 3e-4 of the divergence, 4 leave 1.4e-5."""
     diffusion_tolerance: float = 7e-3
     """Part of a step's viscous change that a diffusion may leave undone, 1e-14 … 0.5: Chebyshev sweeps

@@ -21,7 +21,8 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.run import Run, RunTimes
-from wfluid.domain.curves import DELAY, EASE, local
+from wfluid.domain.curves import local
+from wfluid.domain.limits import DELAY, EASE, MORPH_TOLERANCE, MORPH_VISCOSITY
 from wfluid.domain.operators import blurred
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -43,15 +44,8 @@ from wfluid.view.quality import MapQuality, measure_map
 FLOW = Timeline(1.0, fps=24.0, substeps=2)
 """The flow's own time: a morph's frames are at parts of it, however long the morph is shown."""
 
-VISCOSITY = 0.03
-"""Of a morph's fluid where none is given [longer side^2/s]: what lies around points goes with them, so that
-features keep their shape."""
-
 FACTORS = (0.5, 1.0, 0.35)
 """On the radii of forces: the viscosity carries their motion wide enough."""
-
-TOLERANCE = 0.5 / 512
-"""Residual that is good enough for a morph [longer side]."""
 
 LEAST_JACOBIAN = 0.1
 """Least det J that a timing mask may leave a map; a flow that leaves less is not to blame on it."""
@@ -218,7 +212,7 @@ def morph(
     delay: float = DELAY,
     reverse: bool = False,
     pingpong: bool = False,
-    tolerance: float = TOLERANCE,
+    tolerance: float = MORPH_TOLERANCE,
     seed: int = 0,
     progress: Callable[[Progress], object] = lambda progress: None,
     **settings,
@@ -238,7 +232,7 @@ def morph(
         Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
     )
     pair = paired(a, b, fit)
-    fluid = Fluid(viscosity=VISCOSITY) if fluid is None else fluid
+    fluid = Fluid(viscosity=MORPH_VISCOSITY) if fluid is None else fluid
     animation = Animation(a, fluid, [], FLOW, **settings)
     extent, side = (animation.grid.width, animation.grid.height), max(b.width, b.height)
     keyframes = [

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from wfluid.system.errors import FileError
+
 COLORSPACES = ("auto", "srgb", "linear", "data")
 
 TYPES = ("uint8", "uint16", "half", "float")
@@ -43,7 +45,7 @@ LINEAR = ("half", "float")
 """Number types that hold linear light; the others hold sRGB."""
 
 
-class PictureError(ValueError):
+class PictureError(FileError):
     """A picture that cannot be read or written; the message says which, why and what to do."""
 
 

@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wfluid.domain.limits import FITS
 from wfluid.domain.paths import Place
 from wfluid.pictures.picture import Picture
-
-FITS = ("fill", "fit", "stretch")
-"""Crop the picture; add bars; change its aspect."""
 
 
 @dataclass(frozen=True, eq=False)

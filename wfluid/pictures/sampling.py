@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-FILTERS = ("nearest", "bilinear", "cubic", "lanczos")
-"""Interpolation between pixels."""
+FILTERS, FILTER = ("nearest", "bilinear", "cubic", "lanczos"), "cubic"
+"""Interpolation between pixels, and the default."""
 
-EDGES = ("clamp", "mirror", "wrap", "transparent")
-"""Values beyond the edges of a picture; kernels are given an edge by its index here."""
+EDGES, EDGE = ("clamp", "mirror", "wrap", "transparent"), "clamp"
+"""Values beyond the edges of a picture, and the default; kernels are given an edge by its index here."""
 
 
 def check_look_up(filter: str, edge: str) -> None:
