@@ -3,6 +3,7 @@
 import pytest
 from scenes import write_pictures
 
+import wfluid.scene.scene
 from wfluid.cli.main import main
 from wfluid.cli.options import scene_of_options
 from wfluid.cli.parser import build_parser
@@ -314,3 +315,22 @@ def test_what_makes_no_scene_writes_nothing(folder, capsys, options, says):
     said = capsys.readouterr().err
     assert says in said and said.count("\n") == 1
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("command", ["animate", "render"])
+def test_a_scene_is_checked_once(folder, monkeypatch, command):
+    """Where it is made, be it of flags or of a file."""
+    checks, check = [], wfluid.scene.scene.checked
+
+    def counted(*arguments):
+        checks.append(arguments)
+        return check(*arguments)
+
+    monkeypatch.setattr("wfluid.scene.scene.checked", counted)
+    monkeypatch.setattr("wfluid.scene.short_forms.checked", counted)
+    (folder / "a.toml").write_text(
+        'wfluid = 1\n[picture]\nfile = "small.png"\n[[force]]\nkind = "push"\ncenter = [3, 4]\nby = [1, 0]\n'
+    )
+    words = ["animate", "small.png", "--push", "30,20:5,0"] if command == "animate" else ["render", "a.toml"]
+    assert main([*words, "--dry-run"]) == 0
+    assert len(checks) == 1

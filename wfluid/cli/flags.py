@@ -59,25 +59,25 @@ def add_morph(parser: argparse.ArgumentParser) -> None:
 
 def _add_keys(parser: argparse.ArgumentParser, without: Sequence[str] = (), morphs: bool = False) -> None:
     """The flags of a scene's keys and of its tables', `without` some; of a morph those it has a use for."""
-    _add_group(parser, "scene", SCENE.meaning, SCENE.keys)
+    add_key_flags(parser, "scene", SCENE.meaning, SCENE.keys)
     for name, what in SCENE.keys.items():
         table = what.each if isinstance(what, ArrayOf) else what
         if not isinstance(table, Table) or name in without or (morphs and name in SCENE.not_in_morph):
             continue
         keys = {key: one for key, one in table.keys.items() if not (morphs and key in table.not_in_morph)}
-        _add_group(parser, name, table.meaning, keys)
+        add_key_flags(parser, name, table.meaning, keys)
 
 
-def _add_group(parser: argparse.ArgumentParser, name: str, meaning: str, keys: Mapping[str, Any]) -> None:
+def add_key_flags(parser: argparse.ArgumentParser, name: str, meaning: str, keys: Mapping[str, Any]) -> None:
     """A group of flags, a key each."""
     flags = {key.flag: key for key in keys.values() if isinstance(key, Key) and key.flag}
     if flags:
         group = parser.add_argument_group(name, meaning)
         for flag, key in flags.items():
-            _add_key(group, flag, key)
+            _add_key_flag(group, flag, key)
 
 
-def _add_key(group: Any, flag: str, key: Key) -> None:
+def _add_key_flag(group: Any, flag: str, key: Key) -> None:
     """The flag of a key; what is not given is None."""
     unit = f" [{key.unit}]" if key.unit else ""
     words = f": {', '.join(key.kind.words)}" if key.kind.words else ""

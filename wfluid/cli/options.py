@@ -29,11 +29,11 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
         ValueError: a flag that makes no sense, by its name.
         SceneError: a value out of its range.
     """
-    tables: dict[str, Any] = {"wfluid": VERSION, **_given(options, SCENE)}
+    tables: dict[str, Any] = {"wfluid": VERSION, **given_keys(options, SCENE)}
     tables["picture"] = {"file": options.picture}
     for name, what in SCENE.keys.items():
         if isinstance(what, Table) and name not in ("keyframes", "morph"):
-            tables[name] = {**tables.get(name, {}), **_given(options, what)}
+            tables[name] = {**tables.get(name, {}), **given_keys(options, what)}
     _check_viscosity(options)
     if options.verb == "keyframes" and not {"value", "image"} & tables["viscosity"].keys():
         tables["viscosity"]["value"] = KEYFRAME_VISCOSITY
@@ -80,7 +80,7 @@ def _flags(what: Any, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, str
             yield from _flags(what.each, item, (*path, n))
 
 
-def _given(options: argparse.Namespace, table: Table) -> dict[str, Any]:
+def given_keys(options: argparse.Namespace, table: Table) -> dict[str, Any]:
     """The keys of a table whose flags are given."""
     found = {}
     for name, key in table.keys.items():
@@ -143,12 +143,12 @@ def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
     table: dict[str, Any] = {"move": moves}
     if options.pin:
         table["pins"] = [as_pair(f"pin {text!r}", "the point X,Y", text) for text in options.pin]
-    return {**table, **_given(options, SCENE.keys["keyframes"])}, names
+    return {**table, **given_keys(options, SCENE.keys["keyframes"])}, names
 
 
 def _morph(options: argparse.Namespace) -> dict[str, Any]:
     """The other picture, and how it goes."""
-    table = {"to": options.to, **_given(options, SCENE.keys["morph"])}
+    table = {"to": options.to, **given_keys(options, SCENE.keys["morph"])}
     if options.timing is not None:
         table |= dict(zip(("timing", "delay"), _mask_and_number(options.timing), strict=False))
     return table
@@ -181,7 +181,7 @@ def _layer_name(file: str) -> str:
 
 def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
     """The picture's outputs, and beside each those of the layers; tracks and report."""
-    stills, layers = _given(options, SCENE.keys["output"].each), _several(options, "layer")
+    stills, layers = given_keys(options, SCENE.keys["output"].each), _several(options, "layer")
     found = []
     for name in options.output:
         found.append({"file": name, **stills})

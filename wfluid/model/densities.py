@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
 from wfluid.domain.limits import INK, LOOKS, VISCOSITY_LIMIT
 from wfluid.domain.paths import Center, as_center, place_at
@@ -94,8 +95,7 @@ class Density:
             raise ValueError("a density needs a name")
         if not 0 <= self.diffusion <= VISCOSITY_LIMIT:
             raise ValueError(f"diffusion {self.diffusion}: expected 0 … {VISCOSITY_LIMIT:g}")
-        if self.look not in LOOKS:
-            raise ValueError(f"look {self.look!r}: expected one of {', '.join(LOOKS)}")
+        check_word("look", self.look, LOOKS)
         if len(self.color) != 3 or not all(0 <= value <= 1 for value in self.color):
             raise ValueError(f"color {self.color}: expected three numbers 0 … 1")
         object.__setattr__(self, "sources", tuple(self.sources))

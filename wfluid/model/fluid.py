@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.limits import CYCLES, SCHEMES, SOLVERS, VISCOSITY
 from wfluid.domain.walls import Wall, Walls
 from wfluid.model.densities import Density
@@ -64,10 +65,10 @@ class Fluid:
             raise TypeError("densities: expected Density objects")
         if len(set(self.density_names)) < len(self.densities):
             raise ValueError(f"densities {', '.join(self.density_names)}: two have one name")
-        _one_of("scheme", self.scheme, SCHEMES)
+        check_word("scheme", self.scheme, SCHEMES)
         default = "jacobi" if self.scheme == "paper" else "multigrid"
         solver = default if self.solver is None else self.solver
-        _one_of("solver", solver, SOLVERS)
+        check_word("solver", solver, SOLVERS)
         object.__setattr__(self, "solver", solver)
         for name in ("pressure_cycles", "sweeps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) >= 1):
@@ -91,8 +92,3 @@ class Fluid:
         """Whether the two components of the velocity may be diffused apart from each other."""
         walls = Walls.parse(self.walls)
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
-
-
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Constant, Envelope
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import IMAGE_BLUR, IMAGE_FORCES
@@ -53,8 +54,7 @@ class ImageForce(FieldForce):
     """Intensities (height, width), or vectors (height, width, 2)."""
 
     def __post_init__(self) -> None:
-        if self.kind not in IMAGE_FORCES:
-            raise ValueError(f"ImageForce: kind {self.kind!r}: expected one of {', '.join(IMAGE_FORCES)}")
+        check_word("ImageForce: kind", self.kind, IMAGE_FORCES)
         if not abs(self.strength) <= FORCE_LIMIT:
             raise ValueError(f"ImageForce: strength {self.strength}: expected at most {FORCE_LIMIT:g}")
         if not (math.isfinite(self.radius) and self.radius >= 0):

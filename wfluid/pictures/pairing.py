@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.limits import FITS
 from wfluid.domain.paths import Place
 from wfluid.pictures.picture import Picture
@@ -68,8 +69,7 @@ def window(size: tuple[int, int], frame: tuple[int, int], fit: str) -> Window:
     Raises:
         ValueError: an unknown fit.
     """
-    if fit not in FITS:
-        raise ValueError(f"fit {fit!r}: expected one of {', '.join(FITS)}")
+    check_word("fit", fit, FITS)
     width, height = size
     if fit == "stretch":
         return Window(0, 0, width, height)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from wfluid.domain.checks import check_word
+
 FILTERS, FILTER = ("nearest", "bilinear", "cubic", "lanczos"), "cubic"
 """Interpolation between pixels, and the default."""
 
@@ -15,6 +17,5 @@ def check_look_up(filter: str, edge: str) -> None:
     Raises:
         ValueError: with the known ones.
     """
-    for name, value, known in (("filter", filter, FILTERS), ("edge", edge, EDGES)):
-        if value not in known:
-            raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
+    check_word("filter", filter, FILTERS)
+    check_word("edge", edge, EDGES)
