@@ -172,7 +172,7 @@ def test_the_readmes_python_runs(tmp_path):
 
 def test_every_option_of_the_command_is_in_the_readme():
     from wfluid.cli.parser import build_parser
-    from wfluid.scene.format import COURSE
+    from wfluid.scene.forces import TIMING_KEYS
 
     text = (ROOT / "README.md").read_text()
     (verbs,) = [a for a in build_parser()._actions if a.dest == "verb"]
@@ -181,4 +181,4 @@ def test_every_option_of_the_command_is_in_the_readme():
         for action in parser._actions:
             for flag in action.option_strings:
                 assert flag in ("-h", "--help", "--output") or f"{flag}" in text, f"{verb} {flag}"
-    assert all(f"`{key}`" in text for key in COURSE if key != "envelope")
+    assert all(f"`{key}`" in text for key in TIMING_KEYS if key != "envelope")

@@ -13,8 +13,8 @@ import wfluid.animation.animation
 import wfluid.cli.render
 from wfluid.cli.main import main
 from wfluid.cli.progress import SearchProgress
+from wfluid.domain.limits import TOLERANCE
 from wfluid.domain.timeline import substeps_for
-from wfluid.keyframes.keyframes import TOLERANCE
 from wfluid.pictures.stills import read_picture
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SceneError

@@ -10,8 +10,9 @@ from scenes import KEYS, write_pictures
 
 import wfluid.cli.render
 from wfluid.cli.main import main
+from wfluid.domain.limits import MORPH_TOLERANCE, MORPH_VISCOSITY
 from wfluid.keyframes.match import match_keyframes
-from wfluid.morphing.morph import FLOW, TOLERANCE, VISCOSITY
+from wfluid.morphing.morph import FLOW
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture, write_picture
 from wfluid.scene.scene import Scene
@@ -106,7 +107,7 @@ def test_what_is_left_out_is_the_documented_default(folder):
     for its in (course.warp_curve, course.blend_curve):
         np.testing.assert_allclose(its.at(parts), 3 * parts**2 - 2 * parts**3)
     assert (course.blend, course.delay, course.reverse, course.pingpong) == ("linear", 0.5, False, False)
-    assert found.aims.tolerance == TOLERANCE and found.animation.fluid.viscosity == VISCOSITY
+    assert found.aims.tolerance == MORPH_TOLERANCE and found.animation.fluid.viscosity == MORPH_VISCOSITY
     assert found.animation.timeline == FLOW and found.aims.keyframes[0].time == FLOW.end
     assert (course.timeline.duration, course.timeline.fps) == (2, 5)
     assert staged(folder, {}, viscosity={"value": 0.01}).animation.fluid.viscosity == 0.01
@@ -216,7 +217,7 @@ def test_the_report_says_how_well_both_pictures_meet(shot):
     report = json.loads((folder / "r.json").read_text())
     said = report["morph"]
     assert report["status"] == "reached" and report["frames"] == 7 and report["fps"] == 12
-    assert report["steps"] == FLOW.steps and report["settings"]["viscosity"] == VISCOSITY
+    assert report["steps"] == FLOW.steps and report["settings"]["viscosity"] == MORPH_VISCOSITY
     assert said["to"] == [60, 40] and said["window"] == [0, 0, 60, 40]
     assert report["tolerance_px"] == pytest.approx(0.5 * 60 / 512)
     for which in ("first", "second"):

@@ -3,10 +3,11 @@
 import pytest
 from scenes import write_pictures
 
+import wfluid.scene.scene
 from wfluid.cli.main import main
 from wfluid.cli.options import scene_of_options
 from wfluid.cli.parser import build_parser
-from wfluid.scene.format import FORCES
+from wfluid.scene.forces import FORCES
 from wfluid.scene.short_forms import parse_density, parse_force
 
 SHORT = {
@@ -47,10 +48,10 @@ def test_a_short_form_is_the_table_it_means(kind):
     text, table = SHORT[kind]
     found = parse_force(kind, text)
     assert found == {"kind": kind, **table} and next(iter(found)) == "kind"
-    assert set(SHORT) == set(FORCES) - {"buoyancy"}
+    assert set(SHORT) == set(FORCES.tables) - {"buoyancy"}
 
 
-@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in SHORT for key in FORCES[kind].keys])
+@pytest.mark.parametrize(("kind", "key"), [(kind, key) for kind in SHORT for key in FORCES.tables[kind].keys])
 def test_an_option_of_a_short_form_is_the_key_of_its_name(kind, key):
     """But for what has no short form, or was said before."""
     text, table = SHORT[kind]
@@ -59,7 +60,7 @@ def test_an_option_of_a_short_form_is_the_key_of_its_name(kind, key):
             parse_force(kind, f"{text}:{key}=1")
         return
     written, meant = next(
-        OPTIONS[type_] for type_ in OPTIONS if FORCES[kind].keys[key].type.startswith(type_)
+        OPTIONS[type_] for type_ in OPTIONS if FORCES.tables[kind].keys[key].type.startswith(type_)
     )
     found = parse_force(kind, f"{text}:{key}={written}")
     assert found == {"kind": kind, **table, key: meant} and type(found[key]) is type(meant)
@@ -314,3 +315,22 @@ def test_what_makes_no_scene_writes_nothing(folder, capsys, options, says):
     said = capsys.readouterr().err
     assert says in said and said.count("\n") == 1
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("command", ["animate", "render"])
+def test_a_scene_is_checked_once(folder, monkeypatch, command):
+    """Where it is made, be it of flags or of a file."""
+    checks, check = [], wfluid.scene.scene.checked
+
+    def counted(*arguments):
+        checks.append(arguments)
+        return check(*arguments)
+
+    monkeypatch.setattr("wfluid.scene.scene.checked", counted)
+    monkeypatch.setattr("wfluid.scene.short_forms.checked", counted)
+    (folder / "a.toml").write_text(
+        'wfluid = 1\n[picture]\nfile = "small.png"\n[[force]]\nkind = "push"\ncenter = [3, 4]\nby = [1, 0]\n'
+    )
+    words = ["animate", "small.png", "--push", "30,20:5,0"] if command == "animate" else ["render", "a.toml"]
+    assert main([*words, "--dry-run"]) == 0
+    assert len(checks) == 1

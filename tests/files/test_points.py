@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from wfluid.files.points import PointRow, read_points
-from wfluid.pictures.formats import PictureError
+from wfluid.system.errors import FileError
 
 HEADER, PLACES = (
     "x_cat,y_cat,x_raccoon,y_raccoon\n",
@@ -105,7 +105,7 @@ WRONG = {
 
 @pytest.mark.parametrize("content", WRONG, ids=lambda content: repr(content[:24]))
 def test_what_is_wrong_is_said_in_one_line_with_its_place(read, tmp_path, content):
-    with pytest.raises(PictureError) as refusal:
+    with pytest.raises(FileError) as refusal:
         read(content)
     message = str(refusal.value)
     assert message.startswith(f"{tmp_path / 'points.csv'}:{WRONG[content]}")
@@ -113,7 +113,7 @@ def test_what_is_wrong_is_said_in_one_line_with_its_place(read, tmp_path, conten
 
 
 def test_a_file_that_is_not_there_or_is_a_folder_is_refused(tmp_path):
-    with pytest.raises(PictureError, match=r"none\.csv: no such file of points$"):
+    with pytest.raises(FileError, match=r"none\.csv: no such file of points$"):
         read_points(tmp_path / "none.csv")
-    with pytest.raises(PictureError, match=r": cannot be read \(Is a directory\)$"):
+    with pytest.raises(FileError, match=r": cannot be read \(Is a directory\)$"):
         read_points(str(tmp_path))

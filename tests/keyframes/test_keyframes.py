@@ -16,8 +16,9 @@ from viscous_media import disc
 import wfluid.keyframes.match
 import wfluid.keyframes.search
 from wfluid import Freeze, Grid, Picture, Solver
+from wfluid.domain.limits import TOLERANCE
 from wfluid.fields.device import open_device
-from wfluid.keyframes.keyframes import TOLERANCE, targets_of
+from wfluid.keyframes.keyframes import targets_of
 from wfluid.keyframes.match import REACHED, STOPPED, UNREACHABLE
 from wfluid.keyframes.ways import plan_ways
 

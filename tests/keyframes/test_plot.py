@@ -14,8 +14,8 @@ from wfluid.keyframes.match import match_keyframes
 from wfluid.keyframes.plot import LINES, check_plot, figure_of, plot_match
 from wfluid.keyframes.search import COARSE, FINE, MARCH, Progress
 from wfluid.model.fluid import Fluid
-from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture
+from wfluid.system.errors import FileError
 
 WIDTH, HEIGHT = 64, 48
 
@@ -242,16 +242,16 @@ def test_a_figure_that_fails_leaves_the_old_one(match, tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", fail)
     path = tmp_path / "a.png"
     path.write_bytes(b"old")
-    with pytest.raises(PictureError, match=r"a\.png: cannot be written \(No space left on device\)$"):
+    with pytest.raises(FileError, match=r"a\.png: cannot be written \(No space left on device\)$"):
         plot_match(match, path)
     assert path.read_bytes() == b"old"
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
 
 
 def test_what_cannot_be_written_is_refused_before_anything_is_drawn(tmp_path):
-    with pytest.raises(PictureError, match=r"a\.gif: plots are written as \.png, \.pdf, \.svg$"):
+    with pytest.raises(FileError, match=r"a\.gif: plots are written as \.png, \.pdf, \.svg$"):
         plot_match(None, tmp_path / "a.gif")
-    with pytest.raises(PictureError, match=r"none: no such folder; make it first$"):
+    with pytest.raises(FileError, match=r"none: no such folder; make it first$"):
         plot_match(None, tmp_path / "none" / "a.png")
 
 

@@ -23,8 +23,9 @@ from morph_cases import (
 )
 
 from wfluid import Painted, Picture, Timeline, morph
+from wfluid.domain.limits import MORPH_TOLERANCE as TOLERANCE
 from wfluid.keyframes.match import REACHED
-from wfluid.morphing.morph import LEAST_JACOBIAN, TOLERANCE
+from wfluid.morphing.morph import LEAST_JACOBIAN
 from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.picture import resample
 

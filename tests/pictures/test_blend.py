@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from wfluid import Picture
-from wfluid.pictures.blend import BLEND_SPACES, blended, check_light
+from wfluid.domain.limits import BLEND_SPACES
+from wfluid.pictures.blend import blended, check_light
 
 HALF_GREY = ((0.5 + 0.055) / 1.055) ** 2.4
 """The light of sRGB's 0.5, by its definition (IEC 61966-2-1)."""

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from wfluid import Picture
-from wfluid.pictures.pairing import FITS, Window, alike, cropped, paired, window
+from wfluid.domain.limits import FITS
+from wfluid.pictures.pairing import Window, alike, cropped, paired, window
 from wfluid.pictures.picture import resample
 
 SIZES = [

@@ -1,6 +1,7 @@
 """What is wrong in a scene, or beside it, is said in one line with its place, and nothing is written."""
 
 import re
+import time
 
 import pytest
 from scenes import SHOT, render, write_shot
@@ -278,3 +279,13 @@ def test_sizes_beyond_the_memory_are_refused(shots, capsys, monkeypatch):
     reason = refused(capsys, shots, "--dry-run", "--set", "fluid.cells=8000", "--set", "frames.width=30000")
     assert "8000 x 5333 cells and 3 frames 30000 pixels wide need about " in reason
     assert "GB of memory, 2 GB are free" in reason
+
+
+def test_a_key_given_twice_is_said_with_its_column_wherever_it_is(shots, capsys):
+    """Reading a long scene takes no longer for it."""
+    lines = [f"# line {n}" for n in range(3000)]
+    (shots / "shot.toml").write_text("\n".join([*SHOT.splitlines(), *lines, "file = 1", "file = 2"]) + "\n")
+    number = len(SHOT.splitlines()) + 3001
+    began = time.perf_counter()
+    assert refused(capsys, shots).startswith(f"shots/shot.toml:{number}:")
+    assert time.perf_counter() - began < 5

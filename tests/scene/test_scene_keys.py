@@ -77,7 +77,7 @@ def test_a_key_does_what_it_says(folder, heading, key):
 
 def default_of(key):
     """The value that a key's documented default means; None where it is no value."""
-    text = (key.default or "").partition(";")[0]
+    text = key.shown_default.partition(";")[0]
     values = [{"true": True, "false": False}.get(text, text)]
     if text.endswith("% of the longer side"):
         values = [float(text.split()[0]) / 100 * 60]

@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from scenes import KEYS, VALUES, WRONG, changed, full, keys_of, less, named, of_morph, parts, scenes, takes
 
-from wfluid.domain.curves import CURVES
+from wfluid.domain.limits import CURVES
 from wfluid.scene.format import SCENE
 from wfluid.scene.reference import reference, tables
 from wfluid.scene.scene import Scene
-from wfluid.scene.schema import Key, Many, Named, SceneError, SchemaError, Table, Variants, checked
+from wfluid.scene.schema import ArrayOf, Key, MapOf, SceneError, SchemaError, Table, Union, checked
 from wfluid.scene.toml_file import read_scene, write_scene
 
 EVERYTHING = named(less(full(), "morph"), lambda names: names[-1])
@@ -38,7 +38,7 @@ def test_the_scene_with_everything_has_every_key():
     headings = {id(table): heading for heading, _, table in tables()}
     found = set()
     for _, what, value in [*parts(SCENE, EVERYTHING), *parts(SCENE, MORPH)]:
-        table = what.tables[value["kind"]] if isinstance(what, Variants) else what
+        table = what.tables[value["kind"]] if isinstance(what, Union) else what
         if isinstance(table, Table):
             names = [name for name in value if isinstance(table.keys.get(name), Key)]
             found |= {(headings[id(table)], name) for name in names}
@@ -91,7 +91,7 @@ def test_a_scene_written_to_another_folder_means_the_same_files(scene):
         after = read_scene(away / "a.toml")
         assert sorted(resolved(after.files())) == sorted(resolved(before.files()))
         assert written(after) == written(before)
-        assert after.moved(home).tables == scene
+        assert after.tables_in(home) == scene
 
 
 def resolved(paths):
@@ -109,7 +109,7 @@ def written(scene):
 def test_a_required_key_that_is_missing_is_named(scene):
     """With what it is for, and the path of its table."""
     for path, what, value in parts(SCENE, scene):
-        for name, key in keys_of(what, value).items() if isinstance(what, Table | Variants) else ():
+        for name, key in keys_of(what, value).items() if isinstance(what, Table | Union) else ():
             if isinstance(key, Key) and key.required:
                 error = refused(changed(scene, path, lambda table, name=name: less(table, name)))
                 assert (error.path, error.reason) == (path, f"{name} is missing: {key.meaning}")
@@ -121,7 +121,7 @@ def test_a_required_key_that_is_missing_is_named(scene):
 @example(MORPH, "xyzzy")
 def test_a_key_that_does_not_exist_is_named(scene, name):
     for path, what, _ in parts(SCENE, scene):
-        if isinstance(what, Table | Variants):
+        if isinstance(what, Table | Union):
             error = refused(changed(scene, path, lambda table: {name: 1, **table}))
             assert error.path == (*path, name) and error.reason.startswith("no such key")
 
@@ -202,10 +202,12 @@ def test_a_table_that_is_none_is_named(scene):
     """A value where a table belongs, one table where a list belongs, a list where one table belongs."""
     for path, what, _ in parts(SCENE, scene):
         if path and not isinstance(what, Key):
-            for wrong in (3, "text", {"a": 1} if isinstance(what, Many) else [{}]):
+            for wrong in (3, "text", {"a": 1} if isinstance(what, ArrayOf) else [{}]):
                 error = refused(changed(scene, path, lambda _, wrong=wrong: wrong))
                 assert error.path == path
-                assert ("expected a list of tables" if isinstance(what, Many) else "a table") in error.reason
+                assert (
+                    "expected a list of tables" if isinstance(what, ArrayOf) else "a table"
+                ) in error.reason
 
 
 @ANY
@@ -223,7 +225,7 @@ def test_two_of_one_name_are_refused(scene):
 
 
 def many_named(what):
-    return isinstance(what, Many) and what.unique is not None
+    return isinstance(what, ArrayOf) and what.unique is not None
 
 
 @pytest.mark.parametrize("path", [("force", 0), ("envelopes", "constant")])
@@ -311,9 +313,9 @@ def test_no_table_lies_within_two_lists_unseen():
     seen = {id(table) for _, _, table in tables()}
 
     def all_of(what):
-        if isinstance(what, Many | Named):
+        if isinstance(what, ArrayOf | MapOf):
             return all_of(what.each)
-        if isinstance(what, Variants):
+        if isinstance(what, Union):
             return [table for inner in what.tables.values() for table in all_of(inner)]
         below = [] if isinstance(what, Key) else [t for key in what.keys.values() for t in all_of(key)]
         return [what, *below] if isinstance(what, Table) else below

@@ -10,9 +10,9 @@ from wfluid.cli.main import main
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import write_picture
 from wfluid.scene.format import SCENE
+from wfluid.scene.names import SHOWN
 from wfluid.scene.reference import tables
-from wfluid.scene.scene import SHOWN
-from wfluid.scene.schema import Key, Many, Named, Table, Variants
+from wfluid.scene.schema import ArrayOf, Key, MapOf, Table, Union
 
 VALUES = (
     *(0, 1, 2, 30, 1001, 2**32 - 1, -1, 0.25, 1 / 3, 7.5, -2.5, 1e-5, 1.5e300, True, False),
@@ -58,11 +58,11 @@ def valid(what):
         if what.type == "a text" and not what.file:
             return found | st.text(min_size=1).filter(lambda text: takes(what, text))
         return found | st.floats(0.1, 0.9) if takes(what, 0.1) and takes(what, 0.9) else found
-    if isinstance(what, Many):
+    if isinstance(what, ArrayOf):
         return st.lists(valid(what.each), max_size=2)
-    if isinstance(what, Named):
+    if isinstance(what, MapOf):
         return st.dictionaries(st.text(min_size=1), valid(what.each), max_size=2)
-    if isinstance(what, Variants):
+    if isinstance(what, Union):
         return st.one_of(valid_variant(what, kind) for kind in what.tables)
     must = {name for name, key in what.keys.items() if isinstance(key, Key) and key.required}
     return st.fixed_dictionaries(
@@ -142,20 +142,20 @@ def full(what=SCENE):
         return taken(what)[0]
     if isinstance(what, Table):
         return {name: full(key) for name, key in what.keys.items()}
-    each = what.each if isinstance(what, Many | Named) else what
-    kinds = each.tables if isinstance(each, Variants) else {None: each}
+    each = what.each if isinstance(what, ArrayOf | MapOf) else what
+    kinds = each.tables if isinstance(each, Union) else {None: each}
     found = [{"kind": kind, **full(table)} if kind else full(table) for kind, table in kinds.items()]
-    return {table["kind"]: table for table in found} if isinstance(what, Named) else found
+    return {table["kind"]: table for table in found} if isinstance(what, MapOf) else found
 
 
 def parts(what, value, path=()):
     """Every part of a scene: its path, what the schema has for it, and its value."""
     yield path, what, value
-    if isinstance(what, Many | Named):
-        items = enumerate(value) if isinstance(what, Many) else value.items()
+    if isinstance(what, ArrayOf | MapOf):
+        items = enumerate(value) if isinstance(what, ArrayOf) else value.items()
         for name, item in items:
             yield from parts(what.each, item, (*path, name))
-    elif isinstance(what, Table | Variants):
+    elif isinstance(what, Table | Union):
         for name, key in keys_of(what, value).items():
             if name in value:
                 yield from parts(key, value[name], (*path, name))
@@ -163,7 +163,7 @@ def parts(what, value, path=()):
 
 def keys_of(what, value):
     """The keys that a table of a scene may have, but for its kind."""
-    return what.tables[value["kind"]].keys if isinstance(what, Variants) else what.keys
+    return what.tables[value["kind"]].keys if isinstance(what, Union) else what.keys
 
 
 def changed(value, path, change):

@@ -23,6 +23,7 @@ from wfluid import (
     Encoding,
     Envelope,
     Fade,
+    FileError,
     Fluid,
     Frame,
     Free,
@@ -185,4 +186,6 @@ def read_and_written() -> None:
     except SceneError as error:
         assert_type(error.args, tuple[Any, ...])
     except PictureError as error:
+        assert_type(error.args, tuple[Any, ...])
+    except FileError as error:
         assert_type(error.args, tuple[Any, ...])

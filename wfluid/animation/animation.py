@@ -11,24 +11,19 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
-from wfluid.domain.grid import LEAST_CELLS, Grid
-from wfluid.domain.timeline import Timeline
+from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS, Grid
+from wfluid.domain.limits import SIZE_LIMIT
+from wfluid.domain.timeline import FPS, Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
 from wfluid.pictures.picture import Picture
-from wfluid.pictures.sampling import check_look_up
+from wfluid.pictures.sampling import EDGE, FILTER, check_look_up
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.densities import composite_densities
 from wfluid.view.lookup import LookUp
 from wfluid.view.quality import measure_map
-
-CELLS_LIMIT = 8192
-"""Most cells along the longer side: indices are 32-bit."""
-
-SIZE_LIMIT = 32768
-"""Longest side of a frame [px]."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +44,15 @@ class Animation:
     """Forces and groups of forces on the fluid."""
     timeline: Timeline
     """Duration, frame rate and steps per frame."""
-    cells: int = 256
+    cells: int = CELLS
     """Cells of the grid along the picture's longer side."""
     width: int | None = None
     """Width of the frames [px]; the picture's by default."""
     height: int | None = None
     """Height of the frames [px]; the picture's by default."""
-    filter: str = "cubic"
+    filter: str = FILTER
     """Interpolation between the picture's pixels: "nearest", "bilinear", "cubic", "lanczos"."""
-    edge: str = "clamp"
+    edge: str = EDGE
     """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
     device: str | None = None
     """"cpu" (default), "cuda", "cuda:1", …"""
@@ -167,7 +162,7 @@ def animate(
     fluid: Fluid,
     forces: Sequence[Force | Group],
     duration: float,
-    fps: float = 24.0,
+    fps: float = FPS,
     substeps: int | None = None,
     **settings,
 ) -> Run[Frame]:

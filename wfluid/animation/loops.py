@@ -20,6 +20,7 @@ import numpy as np
 
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
+from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Envelope, Instantaneous, Oscillator, Product, product
 from wfluid.domain.piecewise import ease
 from wfluid.domain.timeline import LOOPS
@@ -57,8 +58,7 @@ def check_loop(loop: str, forces: Sequence[Force]) -> None:
     Raises:
         ValueError: with the known loops, or the remedy.
     """
-    if loop not in LOOPS:
-        raise ValueError(f"loop {loop!r}: expected one of {', '.join(LOOPS)}")
+    check_word("loop", loop, LOOPS)
     if loop == "oscillate" and not any(_oscillates(force) for force in forces):
         raise ValueError(
             "loop oscillate: no force oscillates; give one a period, or use pingpong or crossfade"

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from wfluid.animation.animation import Animation
+from wfluid.cli.exits import Exit
 from wfluid.domain.grid import Grid
 from wfluid.gradient.functional import Functional
 from wfluid.gradient.objectives import Objective, ParticleMisfit, Sum
@@ -28,11 +29,9 @@ TIGHT = 1e-12
 DENSITY_WEIGHT = 1e-3
 """Of a density's square beside the displacement's, which is as small."""
 
-EXIT_WRONG = 1
-
 
 def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
-    """Test every number of a scene that has a gradient; print a table; 1 if one is wrong, else 0.
+    """Test every number of a scene that has a gradient; print a table; `FAILED` if one is wrong.
 
     The objective is the misfit of its keyframes, if it has some; else the mean square of the displacement,
     and of densities, at the end. Forces that were found for its keyframes act too.
@@ -58,7 +57,7 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
         numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>6s}"
         print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
         wrong += not rate.holds
-    return EXIT_WRONG if wrong else 0
+    return Exit.FAILED if wrong else Exit.DONE
 
 
 def _functional(animation: Animation, aims: Aims | None) -> Functional:

@@ -51,9 +51,10 @@ def run_check_gradient(options: argparse.Namespace) -> int:
 
 
 def _run(scene, options: argparse.Namespace) -> int:
-    from wfluid.cli.render import RunOptions, run_scene
+    from wfluid.cli.checks import RunOptions
+    from wfluid.cli.render import run_scene
 
-    how = RunOptions(
+    run = RunOptions(
         device=options.device,
         quiet=options.quiet,
         dry_run=options.dry_run,
@@ -61,4 +62,4 @@ def _run(scene, options: argparse.Namespace) -> int:
         save_scene=getattr(options, "save_scene", None),
         plot=getattr(options, "plot", None),
     )
-    return run_scene(scene, how)
+    return run_scene(scene, run)

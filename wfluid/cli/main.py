@@ -9,29 +9,29 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from wfluid.cli.exits import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED
+from wfluid.cli.exits import Exit
 from wfluid.cli.parser import build_parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; returns the exit code."""
-    options = build_parser().parse_args(arguments)
-    options.arguments = sys.argv[1:] if arguments is None else list(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    command = next((word for word in words if not word.startswith("-")), "")
+    options = build_parser(command).parse_args(words)
+    options.arguments = words
     warnings.simplefilter("ignore")
     warnings.filterwarnings("always", module="wfluid")
     warnings.showwarning = _show_warning
-    from wfluid.pictures.formats import PictureError
-
     try:
         return options.run(options)
-    except (PictureError, ValueError) as error:
+    except ValueError as error:
         print(f"wfluid {options.verb}: {error}", file=sys.stderr)
-        return EXIT_INPUT
+        return Exit.INPUT
     except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
+        return Exit.INTERRUPTED
     except (RuntimeError, ArithmeticError, OSError, MemoryError) as error:
         print(f"wfluid {options.verb}: failed: {error or type(error).__name__}", file=sys.stderr)
-        return EXIT_FAILED
+        return Exit.FAILED
 
 
 def _show_warning(message, *_, **__) -> None:

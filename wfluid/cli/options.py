@@ -1,114 +1,127 @@
-"""What a command line draws, as a scene: the short forms of forces, and the flags of `wfluid animate`."""
+"""The scene that a command line of animate, keyframes or morph says, and the flags of its keys."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from wfluid.domain.limits import KEYFRAME_VISCOSITY
 from wfluid.files.names import numbering
 from wfluid.files.points import read_points
-from wfluid.scene.format import VERSION
+from wfluid.scene.format import SCENE, VERSION
 from wfluid.scene.scene import Scene
-from wfluid.scene.short_forms import as_number, as_pair, parse_density, parse_force, parse_move
-
-_FORCE_FLAGS = {
-    "push": "push",
-    "vortex": "vortex",
-    "grow": "grow",
-    "stroke": "stroke",
-    "wind": "wind",
-    "noise": "noise",
-    "image": "force_image",
-}
-"""Kind of force, and the option that holds its texts."""
-
-_OF_FLUID = ("cells", "walls", "scheme", "solver", "pressure_cycles")
-_OF_TIME = ("duration", "fps", "substeps", "loop")
-_OF_FRAMES = ("width", "scale", "filter", "edge")
-_OF_MORPH = ("fit", "warp_curve", "blend_curve", "blend", "reverse", "pingpong")
-_OF_STILLS = ("start", "type", "compression", "quality")
-
-
-def _flags(*places: tuple, keys: tuple[str, ...]) -> dict[tuple, str]:
-    return {(*place, key): f"--{key.replace('_', '-')}" for place in places for key in keys}
-
-
-_FLAGS = {
-    ("seed",): "--seed",
-    ("picture", "file"): "PICTURE",
-    **_flags(("picture",), keys=("colorspace",)),
-    **_flags(("fluid",), keys=_OF_FLUID),
-    ("viscosity", "value"): "--viscosity",
-    ("viscosity", "floor"): "--viscosity-floor",
-    ("freeze", "strength"): "--freeze MASK:strength",
-    **_flags(("time",), keys=_OF_TIME),
-    **_flags(("frames",), keys=_OF_FRAMES),
-    ("keyframes", "tolerance"): "--tolerance",
-    ("keyframes", "pins"): "--pin",
-    ("morph", "to"): "B",
-    **_flags(("morph",), keys=_OF_MORPH),
-    ("morph", "timing"): "--timing",
-    ("morph", "delay"): "--timing MASK:DELAY",
-    ("tracks",): "--track",
-    **_flags(*(("output", n) for n in range(8)), keys=_OF_STILLS),
-}
-"""The flags by the keys that they set."""
+from wfluid.scene.schema import ArrayOf, Key, Table
+from wfluid.scene.short_forms import FORMS, as_pair, parse_density, parse_move, read_force
 
 KEYFRAME_TIME = 1.0
 """When points arrive that no time is given for [s]."""
 
-KEYFRAME_VISCOSITY = 0.005
-"""Viscosity where keyframes are on the command line and none is [longer side^2/s]: strains spread wider."""
+DENSITIES = ("ink", "smoke")
+"""Short forms that pour a density; the others are forces."""
 
 
 def scene_of_options(options: argparse.Namespace) -> Scene:
-    """The scene of a command line of `wfluid animate`.
+    """The scene of a command line.
 
     Raises:
         ValueError: a flag that makes no sense, by its name.
         SceneError: a value out of its range.
     """
-    tables: dict[str, Any] = {"wfluid": VERSION}
-    if options.seed is not None:
-        tables["seed"] = options.seed
-    tables["picture"] = {"file": options.picture, **_given(options, "colorspace")}
-    tables["fluid"] = _given(options, *_OF_FLUID)
-    tables["viscosity"] = _viscosity(options)
+    tables: dict[str, Any] = {"wfluid": VERSION, **given_keys(options, SCENE)}
+    tables["picture"] = {"file": options.picture}
+    for name, what in SCENE.keys.items():
+        if isinstance(what, Table) and name not in ("keyframes", "morph"):
+            tables[name] = {**tables.get(name, {}), **given_keys(options, what)}
+    _check_viscosity(options)
+    if options.verb == "keyframes" and not {"value", "image"} & tables["viscosity"].keys():
+        tables["viscosity"]["value"] = KEYFRAME_VISCOSITY
     if options.freeze is not None:
         tables["freeze"] = _freeze(options.freeze)
-    if options.effect_mask is not None:
-        tables["effect"] = {"mask": options.effect_mask}
-    tables["time"] = _given(options, *_OF_TIME)
-    tables["frames"] = _given(options, *_OF_FRAMES)
+    flags = {}
     tables["force"], tables["density"] = [], []
-    flags = dict(_FLAGS)
-    for kind, flag in _FORCE_FLAGS.items():
-        for text in getattr(options, flag):
-            flags["force", len(tables["force"])] = f"--{flag.replace('_', '-')} {text}"
-            tables["force"].append(parse_force(kind, text))
-    for look in ("ink", "smoke"):
-        for text in getattr(options, look):
-            density, lift = parse_density(look, text, f"{look} {len(tables['density']) + 1}")
-            flags["density", len(tables["density"])] = f"--{look} {text}"
-            tables["density"].append(density)
-            if lift:
-                flags["force", len(tables["force"])] = f"--{look} {text}"
-                tables["force"].append(lift)
+    _add_drawn(options, tables, flags)
     if options.verb == "morph":
         tables["morph"] = _morph(options)
     if options.verb in ("keyframes", "morph"):
         tables["keyframes"], names = _keyframes(options)
         flags |= {("keyframes", "move", n): name for n, name in enumerate(names)}
-    tables["layer"] = [{"name": _layer_name(file), "file": file} for file in options.layer]
-    flags |= {("layer", n): f"--layer {file}" for n, file in enumerate(options.layer)}
-    if options.track:
-        tables["tracks"] = {
-            "points": [as_pair(f"track {text!r}", "the point X,Y", text) for text in options.track]
-        }
+    layers = _several(options, "layer")
+    tables["layer"] = [{"name": _layer_name(file), "file": file} for file in layers]
+    flags |= {("layer", n): f"--layer {file}" for n, file in enumerate(layers)}
+    points = [as_pair(f"track {text!r}", "the point X,Y", text) for text in _several(options, "track")]
+    tables["tracks"] = {"points": points} if points else {}
     tables["output"] = _outputs(options)
     given = {key: value for key, value in tables.items() if value}
-    return Scene(given, source="command line", flags=flags)
+    return Scene(given, source="command line", flags={**dict(_flags(SCENE, given)), **flags})
+
+
+def flag_name(flag: str) -> str:
+    """The attribute of parsed options that holds a flag's value."""
+    return flag.lstrip("-").replace("-", "_")
+
+
+def force_flag(kind: str) -> str:
+    """The flag of a kind of force: its name, but for a force from a picture."""
+    return "--force-image" if kind == "image" else f"--{kind}"
+
+
+def _flags(what: Any, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, str]]:
+    """What of a command line says a key, by its path, for every key that the tables could have."""
+    if isinstance(what, Key):
+        if what.flag or what.form:
+            yield path, what.flag or what.form
+    elif isinstance(what, Table):
+        for name, inner in what.keys.items():
+            yield from _flags(inner, value.get(name, {}), (*path, name))
+    elif isinstance(what, ArrayOf):
+        for n, item in enumerate(value):
+            yield from _flags(what.each, item, (*path, n))
+
+
+def given_keys(options: argparse.Namespace, table: Table) -> dict[str, Any]:
+    """The keys of a table whose flags are given."""
+    found = {}
+    for name, key in table.keys.items():
+        value = getattr(options, flag_name(key.flag), None) if isinstance(key, Key) and key.flag else None
+        if value is not None:
+            found[name] = _read(key, value) if isinstance(value, str) else value
+    return found
+
+
+def _read(key: Key, text: str) -> Any:
+    """A key's value from a text.
+
+    Raises:
+        ValueError: a text that is no such value, with the flag.
+    """
+    try:
+        return key.kind.read(text)
+    except ValueError as error:
+        raise ValueError(f"{key.flag} {text!r}: {error}") from None
+
+
+def _several(options: argparse.Namespace, name: str) -> list[str]:
+    """What a flag that may be repeated says; nothing where the command does not have it."""
+    return getattr(options, name, [])
+
+
+def _add_drawn(options: argparse.Namespace, tables: dict[str, Any], flags: dict[tuple, str]) -> None:
+    """Add the forces and densities of short forms, and the flag that each comes from."""
+    forces, densities = tables["force"], tables["density"]
+    for kind in FORMS:
+        flag = f"--{kind}" if kind in DENSITIES else force_flag(kind)
+        for text in _several(options, flag_name(flag)):
+            if kind in DENSITIES:
+                density, force = parse_density(kind, text, f"{kind} {len(densities) + 1}")
+                flags["density", len(densities)] = f"{flag} {text}"
+                densities.append(density)
+            else:
+                force = read_force(kind, text)
+            if force:
+                flags["force", len(forces)] = f"{flag} {text}"
+                forces.append(force)
 
 
 def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
@@ -124,69 +137,42 @@ def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
         if row.time is not None:
             moves[-1]["time"] = row.time
         names.append(f"--points {options.points}:{row.line}")
-    latest = next(time for time in (options.time, options.duration, KEYFRAME_TIME) if time is not None)
-    timed = moves if morphs else [{**move, "time": move.get("time", latest)} for move in moves]
-    table: dict[str, Any] = {"move": timed}
+    if not morphs:
+        latest = next(time for time in (options.time, options.duration, KEYFRAME_TIME) if time is not None)
+        moves = [{**move, "time": move.get("time", latest)} for move in moves]
+    table: dict[str, Any] = {"move": moves}
     if options.pin:
         table["pins"] = [as_pair(f"pin {text!r}", "the point X,Y", text) for text in options.pin]
-    return {**table, **_given(options, "tolerance")}, names
+    return {**table, **given_keys(options, SCENE.keys["keyframes"])}, names
 
 
 def _morph(options: argparse.Namespace) -> dict[str, Any]:
     """The other picture, and how it goes."""
-    table = {"to": options.to, **_given(options, "fit", "blend")}
-    for key in ("warp_curve", "blend_curve"):
-        text = getattr(options, key)
-        if text is not None:
-            what = f"--{key.replace('_', '-')} {text!r}"
-            table[key] = [_key(what, part) for part in text.split(",")] if ":" in text else text
+    table = {"to": options.to, **given_keys(options, SCENE.keys["morph"])}
     if options.timing is not None:
-        name, colon, number = options.timing.rpartition(":")
-        try:
-            table |= {"timing": name, "delay": float(number)} if colon else {"timing": options.timing}
-        except ValueError:
-            table["timing"] = options.timing
-    return table | {key: True for key in ("reverse", "pingpong") if getattr(options, key)}
-
-
-def _key(what: str, text: str) -> list[float]:
-    """A key of a curve, "S:PART"."""
-    parts = text.split(":")
-    if len(parts) != 2:
-        raise ValueError(f"{what}: {text!r} is not SECONDS:PART")
-    return [as_number(what, "a key", part) for part in parts]
-
-
-def _given(options: argparse.Namespace, *names: str) -> dict[str, Any]:
-    """The options that are given, by name."""
-    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-
-
-def _viscosity(options: argparse.Namespace) -> dict[str, Any]:
-    if options.viscosity_image is None:
-        for flag in ("viscosity_floor", "invert_viscosity", "viscosity_moves"):
-            if getattr(options, flag) is not None and getattr(options, flag) is not False:
-                raise ValueError(f"--{flag.replace('_', '-')} needs a --viscosity-image")
-    value = options.viscosity
-    if options.verb == "keyframes" and value is None and options.viscosity_image is None:
-        value = KEYFRAME_VISCOSITY
-    given = {
-        "value": value,
-        "image": options.viscosity_image,
-        "floor": options.viscosity_floor,
-        "invert": options.invert_viscosity or None,
-        "moves": options.viscosity_moves or None,
-    }
-    return {key: value for key, value in given.items() if value is not None}
+        table |= dict(zip(("timing", "delay"), _mask_and_number(options.timing), strict=False))
+    return table
 
 
 def _freeze(text: str) -> dict[str, Any]:
-    """MASK:strength, or a MASK whose name may have colons."""
+    return dict(zip(("mask", "strength"), _mask_and_number(text), strict=False))
+
+
+def _mask_and_number(text: str) -> tuple[str, float] | tuple[str]:
+    """MASK:NUMBER, or a MASK whose name may have colons."""
     name, colon, number = text.rpartition(":")
     try:
-        return {"mask": name, "strength": float(number)} if colon else {"mask": text}
+        return (name, float(number)) if colon else (text,)
     except ValueError:
-        return {"mask": text}
+        return (text,)
+
+
+def _check_viscosity(options: argparse.Namespace) -> None:
+    """Refuse flags that need a viscosity image which is not given."""
+    if options.viscosity_image is None:
+        for flag in ("--viscosity-floor", "--invert-viscosity", "--viscosity-moves"):
+            if getattr(options, flag_name(flag)) is not None:
+                raise ValueError(f"{flag} needs a --viscosity-image")
 
 
 def _layer_name(file: str) -> str:
@@ -195,17 +181,16 @@ def _layer_name(file: str) -> str:
 
 def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
     """The picture's outputs, and beside each those of the layers; tracks and report."""
-    stills = _given(options, *_OF_STILLS)
+    stills, layers = given_keys(options, SCENE.keys["output"].each), _several(options, "layer")
     found = []
     for name in options.output:
         found.append({"file": name, **stills})
-        found += [
-            {"file": _beside(name, layer), "of": layer, **stills} for layer in map(_layer_name, options.layer)
-        ]
-    for flag in ("tracks", "report"):
-        if getattr(options, flag) is not None:
-            found.append({"file": getattr(options, flag), "of": flag})
-    if bool(options.track) != (options.tracks is not None):
+        found += [{"file": _beside(name, layer), "of": layer, **stills} for layer in map(_layer_name, layers)]
+    tracks = getattr(options, "tracks", None)
+    for of, file in (("tracks", tracks), ("report", options.report)):
+        if file is not None:
+            found.append({"file": file, "of": of})
+    if bool(_several(options, "track")) != (tracks is not None):
         raise ValueError("--track X,Y and --tracks FILE.csv go together")
     return found
 

@@ -18,9 +18,8 @@ from wfluid.model.force import Force, flatten
 from wfluid.model.painted import Keyed, Painted, Quantity
 from wfluid.morphing.frame import MorphFrame
 from wfluid.morphing.morph import Morph
-from wfluid.pictures.formats import PictureError
 from wfluid.solve.system import Residual
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write_text
 
 
 @dataclass
@@ -257,11 +256,6 @@ def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
     """Write a report as JSON, whole or not at all.
 
     Raises:
-        PictureError: the file cannot be written.
+        FileError: the file cannot be written.
     """
-    path = Path(path)
-    try:
-        with atomic_file(path) as temporary:
-            temporary.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
+    atomic_write_text(Path(path), json.dumps(report, indent=2) + "\n")

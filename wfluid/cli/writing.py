@@ -19,7 +19,7 @@ from wfluid.cli.report import Report
 from wfluid.files.output import open_output
 from wfluid.files.tracks import TrackWriter
 from wfluid.pictures.picture import Picture
-from wfluid.scene.scene import Output, Scene
+from wfluid.scene.scene import Scene
 from wfluid.system.interrupt import HeldInterrupt
 from wfluid.view.densities import upsample
 
@@ -31,23 +31,32 @@ class _Writer(Protocol):
     def abandon(self) -> None: ...
 
 
-def kept_frames(outputs: Sequence[Output]) -> int:
+Output = tuple[_Writer, Callable[[Frame], None]]
+"""What writes an output, and how it takes a frame."""
+
+
+def kept_frames(scene: Scene) -> int:
     """How many outputs hold every frame until the last."""
-    return sum(output.file.suffix.lower() == ".gif" for output in outputs)
+    return sum(Path(output.file).suffix.lower() == ".gif" for output in scene.outputs)
 
 
-def open_writers(scene: Scene, animation: Animation) -> list[tuple[_Writer, Callable[[Frame], None]]]:
-    """What writes each output, and how it takes a frame."""
+def open_writers(scene: Scene, animation: Animation) -> list[Output]:
+    """What writes each output of a scene.
+
+    Raises:
+        FileError: a name that tells no format, or a folder that cannot be written.
+    """
     found = []
-    width, height = scene.tables["picture"].get("size", (animation.picture.width, animation.picture.height))
+    width, height = scene.picture.size or (animation.picture.width, animation.picture.height)
     for output in scene.outputs:
         if output.of == "report":
             continue
+        path = scene.folder / output.file
         if output.of == "tracks":
-            tracks = TrackWriter(output.file, max(width, height))
+            tracks = TrackWriter(path, max(width, height))
             found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
             continue
-        writer = open_output(output.file, scene.timeline.fps, output.start, output.encoding)
+        writer = open_output(path, scene.timeline.fps, output.start, output.encoding)
         found.append((writer, lambda frame, w=writer, of=output.of: w.write(_shown(frame, of))))
     return found
 
@@ -65,7 +74,7 @@ def _shown(frame: Frame, of: str) -> Picture:
 
 def write_frames(
     run: Run,
-    writers: Sequence[tuple[_Writer, Callable[[Frame], None]]],
+    writers: Sequence[Output],
     report: Report,
     quiet: bool,
 ) -> float:
@@ -110,7 +119,7 @@ def write_frames(
         raise
 
 
-def _finished(writers: Sequence[tuple[_Writer, Callable[[Frame], None]]]) -> str:
+def _finished(writers: Sequence[Output]) -> str:
     """The files that are whole, of a sequence the first and the last."""
     found = []
     for writer, _ in writers:

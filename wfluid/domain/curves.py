@@ -9,15 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from wfluid.domain.limits import CURVES, EASE
 from wfluid.domain.piecewise import ease
-
-LINEAR, EASE = "linear", "ease"
-
-CURVES = (LINEAR, EASE)
-"""Curves with a name."""
-
-DELAY, DELAY_LIMIT = 0.5, 0.9
-"""By how much of the time black of a timing mask is behind white, and the most it may."""
 
 
 @dataclass(frozen=True)

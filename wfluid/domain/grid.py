@@ -8,6 +8,9 @@ from dataclasses import dataclass
 LEAST_CELLS = 4
 """Cells along an axis below which a cubic stencil no longer fits."""
 
+CELLS, CELLS_LIMIT = 256, 8192
+"""Cells along the longer side where nothing says it, and the most there may be: indices are 32-bit."""
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -38,7 +41,7 @@ class Grid:
                 raise ValueError(f"grid {name} {length}: expected a positive, finite length")
 
     @classmethod
-    def for_picture(cls, width: int, height: int, cells: int = 256) -> Grid:
+    def for_picture(cls, width: int, height: int, cells: int = CELLS) -> Grid:
         """The grid for a picture of width x height pixels with `cells` along its longer side."""
         longer = max(width, height)
         nx = max(LEAST_CELLS, round(cells * width / longer))

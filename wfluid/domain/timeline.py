@@ -9,11 +9,20 @@ from dataclasses import dataclass
 STEPS_PER_SECOND = 96
 """Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
 
+FPS = 24.0
+"""Frames a second of a `Timeline`, and of `animate`, that name none: the cinema's."""
+
+SCENE_FPS = 15.0
+"""The same of scenes and command lines, which mostly write a GIF: its size grows with every frame."""
+
 LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
 """Frame rates that make sense."""
 
 FRAME_LIMIT = 100_000
 """Most frames of one animation."""
+
+SUBSTEPS_LIMIT = 100_000
+"""Most steps a frame that a scene may ask for."""
 
 MOST_FACTOR = 8
 """Times the least steps that may be taken so that a time falls on one."""
@@ -38,7 +47,7 @@ class Timeline:
 
     duration: float
     """Length [s], positive."""
-    fps: float = 24.0
+    fps: float = FPS
     """Frames a second."""
     substeps: int | None = None
     """Steps a frame; by default so many that a step is no longer than 1/96 s."""

@@ -8,9 +8,6 @@ from pathlib import Path
 
 from wfluid.pictures.formats import PictureError
 
-FIRST_FRAME = 1001
-"""Number of the first frame of a sequence (the convention of film work)."""
-
 
 def check_folder(path: Path) -> None:
     """Refuse a path at which no file can be written; nothing on the disk changes.

@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
+from wfluid.domain.limits import FIRST_FRAME
 from wfluid.files import movie
 from wfluid.files.gif import GifWriter
 from wfluid.files.movie import MovieWriter
-from wfluid.files.names import FIRST_FRAME, check_folder, numbering
+from wfluid.files.names import check_folder, numbering
 from wfluid.files.stills import StillsWriter
 from wfluid.pictures.formats import Encoding, PictureError
 from wfluid.pictures.picture import Picture

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 
-from wfluid.pictures.formats import PictureError
+from wfluid.system.errors import FileError
 
 COLUMNS = ("from x", "from y", "to x", "to y", "time")
 """Meaning of the columns, the last of which is optional; a file may use other names."""
@@ -40,7 +40,7 @@ def read_points(path: str | os.PathLike) -> list[PointRow]:
     that begin with # are skipped. Points are not compared with the size of a picture.
 
     Raises:
-        PictureError: a file that is missing, no text or has no points; or an invalid line, with its number.
+        FileError: a file that is missing, no text or has no points; or an invalid line, with its number.
     """
     path, found = Path(path), []
     names: Sequence[str] | None = None
@@ -57,9 +57,9 @@ def read_points(path: str | os.PathLike) -> list[PointRow]:
             names = names or COLUMNS
             found.append(_row_of(number, row, names))
         except (csv.Error, ValueError) as error:
-            raise PictureError(f"{path}:{number}: {error}") from None
+            raise FileError(f"{path}:{number}: {error}") from None
     if not found:
-        raise PictureError(f"{path}: has no points")
+        raise FileError(f"{path}: has no points")
     return found
 
 
@@ -68,10 +68,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise PictureError(f"{path}: no such file of points") from None
+        raise FileError(f"{path}: no such file of points") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "no UTF-8 text"
-        raise PictureError(f"{path}: cannot be read ({reason})") from None
+        raise FileError(f"{path}: cannot be read ({reason})") from None
     for number, line in enumerate(text.split("\n"), start=1):
         if line.strip() and not line.lstrip().startswith("#"):
             yield number, line

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wfluid.pictures.formats import PictureError
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write_text
+from wfluid.system.errors import FileError
 
 
 class TrackWriter:
@@ -17,12 +17,12 @@ class TrackWriter:
     Pixels are those of a frame whose longer side is `side`.
 
     Raises:
-        PictureError: a name that does not end in .csv.
+        FileError: a name that does not end in .csv.
     """
 
     def __init__(self, path: Path, side: float):
         if path.suffix.lower() != ".csv":
-            raise PictureError(f"{path}: tracks are written as .csv")
+            raise FileError(f"{path}: tracks are written as .csv")
         self.path, self._side = path, side
         self.written: list[Path] = []
         self._rows: list[str] = []
@@ -37,8 +37,7 @@ class TrackWriter:
     def close(self) -> None:
         """Write the file, if there are frames."""
         if self._rows:
-            with atomic_file(self.path) as temporary:
-                temporary.write_text("\n".join(["frame,time,point,x,y", *self._rows]) + "\n")
+            atomic_write_text(self.path, "\n".join(["frame,time,point,x,y", *self._rows]) + "\n")
             self.written.append(self.path)
 
     def abandon(self) -> None:

@@ -11,9 +11,6 @@ import numpy as np
 
 from wfluid.domain.paths import Place
 
-TOLERANCE = 0.25 / 512
-"""Default tolerance of residuals [longer side]: a quarter of a pixel of a picture 512 pixels long."""
-
 COINCIDENT = 1e-6
 """Places closer than this are the same [longer side]."""
 

@@ -26,12 +26,13 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.domain.grid import Grid
+from wfluid.domain.limits import TOLERANCE
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
 from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.variables import Free
 from wfluid.keyframes.arrival import Arrival, reason_unreached
-from wfluid.keyframes.keyframes import TOLERANCE, ParticleKeyframe, PointTarget, targets_of
+from wfluid.keyframes.keyframes import ParticleKeyframe, PointTarget, targets_of
 from wfluid.keyframes.search import (
     COARSE,
     FINE,

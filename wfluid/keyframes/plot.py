@@ -24,9 +24,9 @@ from wfluid.files.names import check_folder
 from wfluid.keyframes.arrival import Arrival
 from wfluid.keyframes.match import Match
 from wfluid.keyframes.search import COARSE, FINE, MARCH
-from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture, encode
 from wfluid.system.atomic import atomic_file
+from wfluid.system.errors import FileError
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -73,11 +73,11 @@ def check_plot(path: str | os.PathLike) -> Path:
 
     Raises:
         ValueError: matplotlib is not installed.
-        PictureError: an ending that is no figure's, or a folder that is not there or cannot be written.
+        FileError: an ending that is no figure's, or a folder that is not there or cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
-        raise PictureError(f"{path}: plots are written as {', '.join(ENDINGS)}")
+        raise FileError(f"{path}: plots are written as {', '.join(ENDINGS)}")
     check_folder(path)
     try:
         import matplotlib  # noqa: F401
@@ -97,7 +97,7 @@ def plot_match(match: Match, path: str | os.PathLike) -> None:
 
     Raises:
         ValueError: matplotlib is not installed.
-        PictureError: an ending that is no figure's, or the file cannot be written.
+        FileError: an ending that is no figure's, or the file cannot be written.
     """
     path = check_plot(path)
     ending = path.suffix.lower()
@@ -107,7 +107,7 @@ def plot_match(match: Match, path: str | os.PathLike) -> None:
             with atomic_file(path) as temporary:
                 figure.savefig(temporary, format=ending[1:], dpi=_DPI, metadata=_UNDATED[ending])
         except OSError as error:
-            raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
+            raise FileError(f"{path}: cannot be written ({error.strerror})") from error
 
 
 def figure_of(match: Match) -> Figure:

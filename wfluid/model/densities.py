@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
+from wfluid.domain.limits import INK, LOOKS, VISCOSITY_LIMIT
 from wfluid.domain.paths import Center, as_center, place_at
 from wfluid.domain.piecewise import finite
 from wfluid.model.force import GaussianImpulse, check_radius, impulse_slopes, shape_slopes
-from wfluid.model.painted import VISCOSITY_LIMIT, Painted
-
-LOOKS = ("ink", "smoke")
+from wfluid.model.painted import Painted
 
 SOURCE_RATE_LIMIT = 1e6
 """Most that a source may pour [1/s]."""
@@ -85,7 +85,7 @@ class Density:
     """What is there at the beginning; nothing by default."""
     sources: Sequence[Source | PaintedSource] = ()
     """S: what is poured in."""
-    color: tuple[float, float, float] = (0.02, 0.02, 0.08)
+    color: tuple[float, float, float] = INK
     """Its colour, red, green, blue, 0 … 1 in linear light."""
     look: str = "ink"
     """"ink" lets through color^rho of the light, "smoke" covers 1 - exp(-rho) of what is behind."""
@@ -95,8 +95,7 @@ class Density:
             raise ValueError("a density needs a name")
         if not 0 <= self.diffusion <= VISCOSITY_LIMIT:
             raise ValueError(f"diffusion {self.diffusion}: expected 0 … {VISCOSITY_LIMIT:g}")
-        if self.look not in LOOKS:
-            raise ValueError(f"look {self.look!r}: expected one of {', '.join(LOOKS)}")
+        check_word("look", self.look, LOOKS)
         if len(self.color) != 3 or not all(0 <= value <= 1 for value in self.color):
             raise ValueError(f"color {self.color}: expected three numbers 0 … 1")
         object.__setattr__(self, "sources", tuple(self.sources))

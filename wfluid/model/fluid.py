@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
+from wfluid.domain.limits import CYCLES, SCHEMES, SOLVERS, VISCOSITY
 from wfluid.domain.walls import Wall, Walls
 from wfluid.model.densities import Density
 from wfluid.model.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
-
-SCHEMES = ("standard", "paper")
-SOLVERS = ("multigrid", "jacobi")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +22,7 @@ class Fluid:
         ValueError: a value outside its range, with the range.
     """
 
-    viscosity: Quantity | np.ndarray = 0.001
+    viscosity: Quantity | np.ndarray = VISCOSITY
     """Kinematic viscosity mu [longer side^2/s], 0 … 1000: a number (the paper's figure 2: 0.001 …
     0.005), an array (height, width) of any size over the picture, a `Painted` picture, `Keyed` ones, or
     a function of the time [s] that gives any of these."""
@@ -36,12 +35,12 @@ class Fluid:
     walls: Walls | str = field(default_factory=Walls)
     """Condition at the picture's edges: a `Walls`, or "free-slip", "no-slip", "periodic" or two of
     them as "x,y"."""
-    scheme: str = "standard"
+    scheme: str = SCHEMES[0]
     """"standard": midpoint traces, cubic interpolation; "paper": Euler traces, bilinear interpolation
     and Jacobi solves, to reproduce it."""
     solver: str | None = None
     """"multigrid" (the standard scheme's default) or "jacobi" (the paper's)."""
-    pressure_cycles: int = 3
+    pressure_cycles: int = CYCLES
     """Multigrid cycles a projection: 3 leave 3e-4 of the divergence, 4 leave 1.4e-5."""
     diffusion_tolerance: float = 7e-3
     """Part of a step's viscous change that a diffusion may leave undone, 1e-14 … 0.5: Chebyshev sweeps
@@ -66,10 +65,10 @@ class Fluid:
             raise TypeError("densities: expected Density objects")
         if len(set(self.density_names)) < len(self.densities):
             raise ValueError(f"densities {', '.join(self.density_names)}: two have one name")
-        _one_of("scheme", self.scheme, SCHEMES)
+        check_word("scheme", self.scheme, SCHEMES)
         default = "jacobi" if self.scheme == "paper" else "multigrid"
         solver = default if self.solver is None else self.solver
-        _one_of("solver", solver, SOLVERS)
+        check_word("solver", solver, SOLVERS)
         object.__setattr__(self, "solver", solver)
         for name in ("pressure_cycles", "sweeps"):
             if not (isinstance(getattr(self, name), int) and getattr(self, name) >= 1):
@@ -93,8 +92,3 @@ class Fluid:
         """Whether the two components of the velocity may be diffused apart from each other."""
         walls = Walls.parse(self.walls)
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
-
-
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")

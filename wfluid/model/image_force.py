@@ -7,19 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Constant, Envelope
 from wfluid.domain.grid import Grid
+from wfluid.domain.limits import IMAGE_BLUR, IMAGE_FORCES
 from wfluid.domain.operators import before, blurred, mean_with_before
 from wfluid.domain.walls import Walls
 from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture, as_stored, resample
-
-KINDS = ("gradient", "contour", "vectors")
-
-DEFAULT_RADIUS = 0.01
-"""Sigma of the blur before slopes are taken [longer side]: about three pixels of a grid of 256."""
-
 
 _FLAT = 1e-5
 """Range of intensities below which slopes are rounding."""
@@ -52,14 +48,13 @@ class ImageForce(FieldForce):
     """Course in time."""
     weight: Painted | None = None
     """Where it acts: a factor painted over the picture."""
-    radius: float = DEFAULT_RADIUS
+    radius: float = IMAGE_BLUR
     """Sigma of the blur before slopes are taken [longer side]; 0 for none."""
     _values: np.ndarray = field(init=False, repr=False)
     """Intensities (height, width), or vectors (height, width, 2)."""
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"ImageForce: kind {self.kind!r}: expected one of {', '.join(KINDS)}")
+        check_word("ImageForce: kind", self.kind, IMAGE_FORCES)
         if not abs(self.strength) <= FORCE_LIMIT:
             raise ValueError(f"ImageForce: strength {self.strength}: expected at most {FORCE_LIMIT:g}")
         if not (math.isfinite(self.radius) and self.radius >= 0):

@@ -15,17 +15,9 @@ from functools import lru_cache
 import numpy as np
 
 from wfluid.domain.grid import Grid
+from wfluid.domain.limits import DRAG, DRAG_LIMIT, VISCOSITY_LIMIT
 from wfluid.domain.piecewise import interval
 from wfluid.pictures.picture import Picture, intensity, resample
-
-VISCOSITY_LIMIT = 1e3
-"""Largest viscosity the solver is tested with [longer side^2/s]."""
-
-DRAG_LIMIT = 1e6
-"""Largest drag the solver is tested with [1/s]."""
-
-DEFAULT_STRENGTH = 1e4
-"""Drag of full paint [1/s]: at 24 steps a second what is painted moves 1/400 of what is around it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +112,7 @@ class Freeze:
 
     mask: Picture | np.ndarray
     """White, or 1, stays; black, or 0, is free."""
-    strength: float = DEFAULT_STRENGTH
+    strength: float = DRAG
     """Drag of full paint [1/s]."""
     paint: Painted = field(init=False, repr=False)
     """The mask's paint."""

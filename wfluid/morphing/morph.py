@@ -24,7 +24,8 @@ import numpy as np
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.run import Run, RunTimes
-from wfluid.domain.curves import DELAY, EASE, delayed_part
+from wfluid.domain.curves import delayed_part
+from wfluid.domain.limits import DELAY, EASE, MORPH_TOLERANCE, MORPH_VISCOSITY
 from wfluid.domain.operators import blurred
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -46,15 +47,8 @@ from wfluid.view.quality import MapQuality, measure_map
 FLOW = Timeline(1.0, fps=24.0, substeps=2)
 """Timeline of the flow; the frames of a morph of any duration are spread over it."""
 
-VISCOSITY = 0.03
-"""Default viscosity of a morph's fluid [longer side^2/s]: high, so that features around points move with them
-and keep their shape."""
-
 FACTORS = (0.5, 1.0, 0.35)
 """Factors on the radii of forces, smaller than usual: the viscosity spreads their motion."""
-
-TOLERANCE = 0.5 / 512
-"""Default tolerance of residuals of a morph [longer side]."""
 
 LEAST_JACOBIAN = 0.1
 """Least det J of a map with a timing mask, unless the flow has less without the mask."""
@@ -221,7 +215,7 @@ def morph(
     delay: float = DELAY,
     reverse: bool = False,
     pingpong: bool = False,
-    tolerance: float = TOLERANCE,
+    tolerance: float = MORPH_TOLERANCE,
     seed: int = 0,
     progress: Callable[[Progress], object] = lambda progress: None,
     **settings,
@@ -241,7 +235,7 @@ def morph(
         Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
     )
     pair = paired(a, b, fit)
-    fluid = Fluid(viscosity=VISCOSITY) if fluid is None else fluid
+    fluid = Fluid(viscosity=MORPH_VISCOSITY) if fluid is None else fluid
     animation = Animation(a, fluid, [], FLOW, **settings)
     extent, side = (animation.grid.width, animation.grid.height), max(b.width, b.height)
     keyframes = [

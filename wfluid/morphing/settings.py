@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wfluid.domain.curves import DELAY, DELAY_LIMIT, EASE, Curve, curve_of
+from wfluid.domain.curves import Curve, curve_of
+from wfluid.domain.limits import DELAY, DELAY_LIMIT, EASE
 from wfluid.domain.timeline import Timeline
 from wfluid.model.painted import Painted
 from wfluid.pictures.blend import check_light

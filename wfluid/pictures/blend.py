@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from wfluid.domain.limits import BLEND_SPACES
 from wfluid.pictures import color
 from wfluid.pictures.picture import Picture
-
-BLEND_SPACES = ("linear", "display")
-"""What is blended: linear light, or display values (sRGB)."""
 
 
 def check_light(light: str) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from wfluid.domain.checks import check_word
+from wfluid.system.errors import FileError
+
 COLORSPACES = ("auto", "srgb", "linear", "data")
 
 TYPES = ("uint8", "uint16", "half", "float")
@@ -43,7 +46,7 @@ LINEAR = ("half", "float")
 """Number types that hold linear light; the others hold sRGB."""
 
 
-class PictureError(ValueError):
+class PictureError(FileError):
     """A picture that cannot be read or written; the message says which, why and what to do."""
 
 
@@ -63,11 +66,11 @@ class Encoding:
     """1 … 100, for JPEG and WebP."""
 
     def __post_init__(self) -> None:
-        if self.type is not None and self.type not in TYPES:
-            raise PictureError(f"type {self.type!r}: expected one of {', '.join(TYPES)}")
+        if self.type is not None:
+            check_word("type", self.type, TYPES, PictureError)
         known = sorted({name for names in _COMPRESSIONS.values() for name in names})
-        if self.compression is not None and self.compression not in known:
-            raise PictureError(f"compression {self.compression!r}: expected one of {', '.join(known)}")
+        if self.compression is not None:
+            check_word("compression", self.compression, known, PictureError)
         if self.quality is not None and not 1 <= self.quality <= 100:
             raise PictureError(f"quality {self.quality}: expected 1 … 100")
 

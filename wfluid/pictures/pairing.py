@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
+from wfluid.domain.limits import FITS
 from wfluid.domain.paths import Place
 from wfluid.pictures.picture import Picture
-
-FITS = ("fill", "fit", "stretch")
-"""Crop the picture; add bars; change its aspect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +69,7 @@ def window(size: tuple[int, int], frame: tuple[int, int], fit: str) -> Window:
     Raises:
         ValueError: an unknown fit.
     """
-    if fit not in FITS:
-        raise ValueError(f"fit {fit!r}: expected one of {', '.join(FITS)}")
+    check_word("fit", fit, FITS)
     width, height = size
     if fit == "stretch":
         return Window(0, 0, width, height)

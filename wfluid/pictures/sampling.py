@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-FILTERS = ("nearest", "bilinear", "cubic", "lanczos")
-"""Interpolation between pixels."""
+from wfluid.domain.checks import check_word
 
-EDGES = ("clamp", "mirror", "wrap", "transparent")
-"""Values beyond the edges of a picture; kernels are given an edge by its index here."""
+FILTERS, FILTER = ("nearest", "bilinear", "cubic", "lanczos"), "cubic"
+"""Interpolation between pixels, and the default."""
+
+EDGES, EDGE = ("clamp", "mirror", "wrap", "transparent"), "clamp"
+"""Values beyond the edges of a picture, and the default; kernels are given an edge by its index here."""
 
 
 def check_look_up(filter: str, edge: str) -> None:
@@ -15,6 +17,5 @@ def check_look_up(filter: str, edge: str) -> None:
     Raises:
         ValueError: with the known ones.
     """
-    for name, value, known in (("filter", filter, FILTERS), ("edge", edge, EDGES)):
-        if value not in known:
-            raise ValueError(f"{name} {value!r}: expected one of {', '.join(known)}")
+    check_word("filter", filter, FILTERS)
+    check_word("edge", edge, EDGES)

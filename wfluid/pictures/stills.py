@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wfluid.domain.checks import check_word
 from wfluid.pictures import color
 from wfluid.pictures.formats import (
     CHANNELS,
@@ -57,8 +58,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     import OpenImageIO as oiio
 
     path = Path(path)
-    if colorspace not in COLORSPACES:
-        raise PictureError(f"colorspace {colorspace!r}: expected one of {', '.join(COLORSPACES)}")
+    check_word("colorspace", colorspace, COLORSPACES, PictureError)
     if not path.is_file():
         why = "is a folder, not a picture" if path.is_dir() else "no such picture"
         raise PictureError(f"{path}: {why}")

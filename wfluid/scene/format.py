@@ -1,478 +1,394 @@
-"""The keys of a scene file. Lengths are pixels of the frame that `picture.size` names, times seconds."""
+"""The keys of a scene file. Lengths are pixels of the frame that `picture.size` names, times seconds.
+
+A field is everything that there is to say of a key: the reader, its refusals, the reference that
+`wfluid render --keys` prints, the flags of the command line and their defaults all come from here.
+"""
 
 from __future__ import annotations
 
-import re
-from dataclasses import replace
-from typing import Any
-
-from wfluid.domain.curves import CURVES, DELAY_LIMIT
-from wfluid.domain.timeline import FPS_LIMIT, LEAST_FPS, LOOPS
-from wfluid.model.densities import LOOKS
-from wfluid.model.fluid import SCHEMES, SOLVERS
-from wfluid.model.image_force import KINDS
-from wfluid.model.painted import DRAG_LIMIT, VISCOSITY_LIMIT
-from wfluid.pictures.blend import BLEND_SPACES
-from wfluid.pictures.formats import COLORSPACES, TYPES
-from wfluid.pictures.pairing import FITS
-from wfluid.pictures.sampling import EDGES, FILTERS
-from wfluid.scene.schema import (
-    Key,
-    Many,
-    Named,
-    Table,
-    Variants,
-    flag,
-    names,
-    number,
-    numbers,
-    rows,
-    text,
-    whole,
-    word,
+from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS
+from wfluid.domain.limits import (
+    AMOUNT_LIMIT,
+    BLEND_SPACES,
+    CURVES,
+    CYCLES,
+    CYCLES_LIMIT,
+    DELAY,
+    DELAY_LIMIT,
+    DRAG,
+    DRAG_LIMIT,
+    EASE,
+    FIRST_FRAME,
+    FITS,
+    INK_CODE,
+    KEYFRAME_VISCOSITY,
+    LOOKS,
+    MORPH_TOLERANCE,
+    MORPH_VISCOSITY,
+    PAINTED_VISCOSITY,
+    SCHEMES,
+    SIZE_LIMIT,
+    SOLVERS,
+    TOLERANCE,
+    VISCOSITY,
+    VISCOSITY_LIMIT,
 )
+from wfluid.domain.timeline import FPS_LIMIT, LEAST_FPS, LOOPS, SCENE_FPS, SUBSTEPS_LIMIT
+from wfluid.domain.walls import Wall
+from wfluid.pictures.formats import COLORSPACES, TYPES, Encoding
+from wfluid.pictures.sampling import EDGE, EDGES, FILTER, FILTERS
+from wfluid.scene.forces import (
+    ENVELOPES,
+    FORCES,
+    POINT,
+    SEED_LIMIT,
+    Blow,
+    EnvelopeTable,
+    Factor,
+    ForceTable,
+    Point,
+    Ramps,
+    Spot,
+    Window,
+)
+from wfluid.scene.schema import SceneTable, array, file_key, key, mapping, optional, table, table_of
+from wfluid.scene.types import color, curve, flag, names, number, numbers, rows, text, version, whole, word
 
 VERSION = 1
 """Of the format that this file describes."""
 
-AMOUNT_LIMIT = 1000.0
-"""Most density that a source may pour, or a picture paint."""
-
-LEAST_TIME = 0.001
-"""Shortest period or window of a force [s]."""
-
-
-def _version(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ValueError("expected a whole number from 1 on")
-    if value > VERSION:
-        raise ValueError(f"a scene of a newer version; this wfluid reads up to {VERSION}: update wfluid")
-    return value
-
-
-def _color(value: Any) -> str:
-    if not isinstance(value, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", value):
-        raise ValueError('expected a colour such as "#1a2b3c"')
-    return value.lower()
-
-
-def _file(meaning: str, required: bool = False, kind: str = "painting") -> Key:
-    return Key(meaning, **text(), required=required, file=kind)
-
-
-def _curve(value: Any) -> str | list[list[float]]:
-    if isinstance(value, str):
-        return word(*CURVES)["check"](value)
-    return _KEYS["check"](value)
-
-
-_KEYS = rows(2, 1, "linear, ease, or a list of keys, [[seconds, value], …]")
-
-_POINT = numbers(2, "two numbers, [x, y]")
-_PATH = rows(3, 2, "two rows or more of [seconds, x, y]")
-
-COURSE = {
-    "start": Key("when it begins", **number(0), unit="s", default="0"),
-    "end": Key("when it ends", **number(above=0), unit="s", default="the end"),
-    "at": Key("one blow at that time, instead of a window", **number(0), unit="s"),
-    "period": Key("oscillate with that period", **number(LEAST_TIME), unit="s"),
-    "phase": Key(
-        "part of a period it is ahead: 0.25 swings about the place, 0 is the paper's sine",
-        **number(),
-        default="0.25; in an oscillating loop 0.5",
-    ),
-    "rise": Key("time over which it grows to its strength", **number(0), unit="s", default="0"),
-    "fall": Key("time over which it ceases before its end", **number(0), unit="s", default="0"),
-    "strength": Key("factor", **number(), default="1"),
-    "envelope": Key("further envelopes that it is multiplied by", **names()),
-}
-"""When a force acts."""
-
-_FORCE = {
-    "name": Key("what it is called, for --set", **text()),
-    "group": Key("the group it belongs to", **text()),
-    **COURSE,
-}
-_MASK = {"mask": _file("acts where this picture is white, instead of the scene's effect mask")}
-_CENTER = {
-    "center": Key("where it acts", **_POINT, unit="px"),
-    "path": Key("where it acts over time, instead of center", **_PATH, unit="s, px"),
-    "radius": Key("sigma of its Gaussian", **number(above=0), unit="px", default="6 % of the longer side"),
-}
-
-FORCES = {
-    "push": Table(
-        "A push along an arrow",
-        {
-            **_CENTER,
-            "by": Key("the arrow: how far it carries its centre", **_POINT, unit="px", required=True),
-            **_FORCE,
-            **_MASK,
-        },
-    ),
-    "vortex": Table(
-        "A twirl, clockwise for positive angles",
-        {
-            **_CENTER,
-            "turn": Key("how far it turns its centre", **number(), unit="degrees", required=True),
-            **_FORCE,
-            **_MASK,
-        },
-    ),
-    "grow": Table(
-        "Growing, or shrinking, with a ring around that gives way; not where it is frozen",
-        {
-            **_CENTER,
-            "factor": Key("how many times as long the centre becomes", **number(0.05, 20), required=True),
-            **{name: key for name, key in _FORCE.items() if name != "at"},
-            "phase": replace(COURSE["phase"], default="0.25"),
-            **_MASK,
-        },
-    ),
-    "stroke": Table(
-        "A drag along a line from start to end",
-        {
-            "points": Key("the line", **rows(2, 2, "two points or more, [[x, y], …]"), unit="px"),
-            "path": Key("the line with its times, instead of points", **_PATH, unit="s, px"),
-            "radius": _CENTER["radius"],
-            **{key: COURSE[key] for key in ("start", "end", "strength", "envelope")},
-            "name": _FORCE["name"],
-            "group": _FORCE["group"],
-            **_MASK,
-        },
-    ),
-    "wind": Table(
-        "One push everywhere; moves something along periodic walls, or under a mask",
-        {"by": Key("how far it carries", **_POINT, unit="px", required=True), **_FORCE, **_MASK},
-    ),
-    "noise": Table(
-        "Turbulence: random eddies",
-        {
-            "amount": Key("how far it carries, root mean square", **number(), unit="px", required=True),
-            "scale": Key(
-                "mean wavelength, up to twice the longer side",
-                **number(above=0),
-                unit="px",
-                default="20 % of the longer side",
-            ),
-            "seed": Key("which noise", **whole(0, 2**32 - 1), default="the scene's, and the force's number"),
-            "change": Key("time in which it changes and comes back", **number(LEAST_TIME), unit="s"),
-            **_FORCE,
-            **_MASK,
-        },
-    ),
-    "image": Table(
-        "A force from a picture, or from the animated one, self",
-        {
-            "file": _file("the picture", required=True),
-            "along": Key("what it follows", **word(*KINDS), default="gradient"),
-            "amount": Key(
-                "how far its strongest place is carried",
-                **number(),
-                unit="px",
-                default="2 % of the longer side",
-            ),
-            "radius": Key(
-                "blur before slopes are taken", **number(0), unit="px", default="1 % of the longer side"
-            ),
-            **_FORCE,
-            **_MASK,
-        },
-    ),
-    "buoyancy": Table(
-        "A density's own push",
-        {
-            "density": Key("name of the density", **text(), required=True),
-            "by": Key("how far it carries where the density is 1", **_POINT, unit="px", required=True),
-            **_FORCE,
-        },
-    ),
-}
-"""Kinds of force, by the key `kind`."""
-
-_WINDOW = {"start": COURSE["start"], "end": COURSE["end"]}
-
-ENVELOPES = {
-    "constant": Table("1 in a window", dict(_WINDOW)),
-    "fade": Table(
-        "1 in a window, with smooth ends", {**_WINDOW, "rise": COURSE["rise"], "fall": COURSE["fall"]}
-    ),
-    "oscillator": Table(
-        "A sine",
-        {
-            **_WINDOW,
-            "period": Key("its period", **number(LEAST_TIME), unit="s", required=True),
-            "phase": COURSE["phase"],
-        },
-    ),
-    "samples": Table(
-        "Straight lines between values",
-        {
-            "times": Key("when", **rows(1, 2, "two numbers or more"), unit="s", required=True),
-            "values": Key("factors", **rows(1, 2, "two numbers or more"), required=True),
-        },
-    ),
-}
-"""Kinds of envelope, by the key `kind`."""
-
-_SOURCE = Table(
-    "What pours a density in: a spot, or a picture",
-    {
-        **_CENTER,
-        "image": _file("pours where this picture is bright, instead of a spot"),
-        "amount": Key(
-            "density poured in all, at the brightest place",
-            **number(-AMOUNT_LIMIT, AMOUNT_LIMIT),
-            default="1",
-        ),
-        **{key: COURSE[key] for key in COURSE if key not in ("period", "phase")},
-    },
-)
-
-_MOVE = Table(
-    "A point that should be somewhere; several of one point make a path",
-    {
-        "from": Key("its place in the untouched picture", **_POINT, unit="px", required=True),
-        "to": Key("where it should be", **_POINT, unit="px", required=True),
-        "time": Key("when", **number(above=0), unit="s", default="that of all"),
-        "weight": Key("how much it counts beside others", **number(above=0), default="1"),
-    },
-)
-
-_FOUND = Table(
-    "A force found before, as a saved scene has it: the search goes on from there",
-    {
-        "center": Key("where it acts", **_POINT, unit="px", required=True),
-        "vector": Key("acceleration at its centre", **_POINT, unit="px/s^2", required=True),
-        "radius": Key("sigma of its Gaussian", **number(above=0), unit="px", required=True),
-        "start": Key("when it begins", **number(0), unit="s", required=True),
-        "end": Key("when it ends", **number(above=0), unit="s", required=True),
-    },
-)
-
-SCENE = Table(
-    "A scene",
-    {
-        "wfluid": Key("version of the format", _version, f"a whole number to {VERSION}", required=True),
-        "seed": Key("of noises that name none, and of keyframes", **whole(0, 2**32 - 1), default="0"),
-        "picture": Table(
-            "What is animated",
-            {
-                "file": _file("the picture", required=True, kind="file"),
-                "size": Key(
-                    "width and height that the scene's pixels refer to",
-                    **numbers(2, "two numbers, [width, height]"),
-                    unit="px",
-                    default="the picture's",
-                ),
-                "colorspace": Key("what its numbers are", **word(*COLORSPACES), default="auto"),
-            },
-        ),
-        "fluid": Table(
-            "How the fluid is computed",
-            {
-                "cells": Key("cells along the longer side", **whole(4, 8192), default="256"),
-                "walls": Key(
-                    "free-slip, no-slip, periodic, or two of them as x,y", **text(), default="free-slip"
-                ),
-                "scheme": Key("standard, or the paper's", **word(*SCHEMES), default="standard"),
-                "solver": Key("of pressure and diffusion", **word(*SOLVERS), default="by scheme"),
-                "pressure_cycles": Key("multigrid cycles a projection", **whole(1, 100), default="3"),
-            },
-        ),
-        "viscosity": Table(
-            "How stiff it is",
-            {
-                "value": Key(
-                    "viscosity, or that of the image's white",
-                    **number(0, VISCOSITY_LIMIT),
-                    unit="longer side^2/s",
-                    default="0.001; 0.1 with an image",
-                ),
-                "image": _file("stiff where this picture is bright (self: the animated one)"),
-                "floor": Key(
-                    "viscosity of the image's black",
-                    **number(0, VISCOSITY_LIMIT),
-                    unit="longer side^2/s",
-                    default="0",
-                ),
-                "invert": Key("stiff where the image is dark", **flag(), default="false"),
-                "moves": Key("whether it moves with the picture", **flag(), default="false"),
-                "key": Many(
-                    Table(
-                        "A viscosity at a time, instead of value and image; between them straight lines",
-                        {
-                            "time": Key("when", **number(0), unit="s", required=True),
-                            "value": Key(
-                                "viscosity, or that of the image's white",
-                                **number(0, VISCOSITY_LIMIT),
-                                unit="longer side^2/s",
-                                required=True,
-                            ),
-                            "image": _file("stiff where this picture is bright"),
-                        },
-                    )
-                ),
-            },
-        ),
-        "freeze": Table(
-            "What stays in its place",
-            {
-                "mask": _file("white stays, by degrees", required=True),
-                "strength": Key("drag of white", **number(0, DRAG_LIMIT), unit="1/s", default="10000"),
-            },
-        ),
-        "effect": Table("Where forces act", {"mask": _file("forces act where it is white", required=True)}),
-        "time": Table(
-            "When frames are shown",
-            {
-                "duration": Key(
-                    "length", **number(above=0), unit="s", default="that of the last keyframe, or 2"
-                ),
-                "fps": Key("frames a second", **number(LEAST_FPS, FPS_LIMIT), default="15"),
-                "substeps": Key(
-                    "steps a frame",
-                    **whole(1, 100_000),
-                    default="steps of at most 1/96 s, with keyframes 1/48 s",
-                ),
-                "loop": Key("how the end meets the beginning", **word(*LOOPS), default="not at all"),
-            },
-        ),
-        "frames": Table(
-            "What they look like",
-            {
-                "width": Key("their width", **whole(1, 32768), unit="px", default="the picture's"),
-                "scale": Key("their size as a factor, instead of width", **number(above=0)),
-                "filter": Key("how the picture is read between pixels", **word(*FILTERS), default="cubic"),
-                "edge": Key("what lies beyond the picture", **word(*EDGES), default="clamp"),
-            },
-        ),
-        "envelopes": Named(Variants("A course in time with a name", ENVELOPES)),
-        "force": Many(Variants("What moves it", FORCES), unique="name"),
-        "group": Many(
-            Table(
-                "Forces edited as one",
-                {
-                    "name": Key("what it is called", **text(), required=True),
-                    "strength": Key("factor on all", **number(), default="1"),
-                    "envelope": Key("envelopes that all are multiplied by", **names()),
-                },
-            ),
-            unique="name",
-        ),
-        "density": Many(
-            Table(
-                "Something dissolved in it, seen over the picture",
-                {
-                    "name": Key("what it is called", **text(), required=True),
-                    "color": Key("its colour", _color, 'a colour such as "#1a2b3c"', default="#27274f"),
-                    "look": Key("colours, or covers", **word(*LOOKS), default="ink"),
-                    "diffusion": Key(
-                        "how fast it spreads",
-                        **number(0, VISCOSITY_LIMIT),
-                        unit="longer side^2/s",
-                        default="0",
-                    ),
-                    "image": _file("there at the beginning where this picture is bright"),
-                    "amount": Key("density of the image's white", **number(0, AMOUNT_LIMIT), default="1"),
-                    "source": Many(_SOURCE),
-                },
-            ),
-            unique="name",
-        ),
-        "layer": Many(
-            Table(
-                "A picture or matte that goes through the same map",
-                {
-                    "name": Key("what it is called", **text(), required=True),
-                    "file": _file("the picture, stretched over the animated one", required=True, kind="file"),
-                    "data": Key(
-                        "whether its numbers are data, not colours", **flag(), default="true for one channel"
-                    ),
-                },
-            ),
-            unique="name",
-        ),
-        "tracks": Table(
-            "Points that are followed",
-            {"points": Key("where they begin", **rows(2, 1, "a list of points, [[x, y], …]"), unit="px")},
-        ),
-        "keyframes": Table(
-            "Where points arrive: forces are found that take them there",
-            {
-                "move": Many(_MOVE),
-                "points": _file("moves in a CSV file: from x, y, to x, y, perhaps time", kind="file"),
-                "time": Key("of moves that name none", **number(above=0), unit="s", default="the duration"),
-                "pins": Key(
-                    "points that stay in their place until the last keyframe",
-                    **rows(2, 1, "a list of points, [[x, y], …]"),
-                    unit="px",
-                ),
-                "tolerance": Key(
-                    "how far a point may end from its keyframe",
-                    **number(above=0),
-                    unit="px",
-                    default="a quarter, of a picture of 512",
-                ),
-                "force": Many(_FOUND),
-            },
-        ),
-        "morph": Table(
-            "Another picture, into which this one flows; keyframes lead from points of this to points of it",
-            {
-                "to": _file("the other picture", required=True, kind="file"),
-                "size": Key(
-                    "frame size that its pixels refer to",
-                    **numbers(2, "two numbers, [width, height]"),
-                    unit="px",
-                    default="its own",
-                ),
-                "fit": Key("how it covers the frame", **word(*FITS), default="fill"),
-                "warp_curve": Key(
-                    "how far points are on their ways: linear, ease, or [[s, 0 … 1], …]",
-                    _curve,
-                    "a word or keys",
-                    default="ease",
-                ),
-                "blend_curve": Key(
-                    "how much of it is seen, the same", _curve, "a word or keys", default="ease"
-                ),
-                "blend": Key(
-                    "what is mixed: light, or display values", **word(*BLEND_SPACES), default="linear"
-                ),
-                "timing": _file("a mask, white where it happens first"),
-                "delay": Key(
-                    "how much later it happens where the mask is black, a part of the duration",
-                    **number(0, DELAY_LIMIT),
-                    default="0.5",
-                ),
-                "reverse": Key("from the other picture to this", **flag(), default="false"),
-                "pingpong": Key("there and back", **flag(), default="false"),
-            },
-        ),
-        "output": Many(
-            Table(
-                "What is written",
-                {
-                    "file": _file(
-                        "x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report",
-                        required=True,
-                        kind="file",
-                    ),
-                    "of": Key(
-                        "picture, tracks, report, or the name of a layer or density",
-                        **text(),
-                        default="picture",
-                    ),
-                    "start": Key("number of a sequence's first frame", **whole(0, 10**9), default="1001"),
-                    "type": Key("numbers of a sequence", **word(*TYPES), default="the picture's"),
-                    "compression": Key("of EXR and TIFF sequences", **text()),
-                    "quality": Key("of JPEG and WebP sequences", **whole(1, 100)),
-                },
-            )
-        ),
-    },
-)
-"""Everything a scene may say."""
-
 SELF = "self"
+"""What stands for the animated picture where a painting is named."""
+
+_OF_POINTS = "a morph goes without: its flow follows from its points"
+_OF_STEPS = "a morph goes without: its flow has steps of its own"
+_OF_LOOPS = "a morph goes without: set pingpong of [morph]"
+_OF_TIMES = "a morph goes without: its points arrive at its end"
+
+_AREA = "longer side^2/s"
+_SIZE = numbers(2, "two numbers, [width, height]")
+_POINTS = rows(2, 1, "a list of points, [[x, y], …]")
+_WHITE = "viscosity, or that of the image's white"
+
+
+class PictureTable(SceneTable):
+    """What is animated."""
+
+    file: str = file_key("the picture", painting=False, required=True, form="PICTURE")
+    size: Point | None = key(
+        "width and height that the scene's pixels refer to", _SIZE, unit="px", otherwise="the picture's"
+    )
+    colorspace: str = key(
+        "what its numbers are", word(*COLORSPACES), default=COLORSPACES[0], flag="--colorspace"
+    )
+
+
+class FluidTable(SceneTable):
+    """How the fluid is computed."""
+
+    cells: int = key(
+        "cells along the longer side", whole(LEAST_CELLS, CELLS_LIMIT), default=CELLS, flag="--cells"
+    )
+    walls: str = key(
+        "free-slip, no-slip, periodic, or two of them as x,y",
+        text(),
+        default=Wall.FREE_SLIP.value,
+        flag="--walls",
+    )
+    scheme: str = key("standard, or the paper's", word(*SCHEMES), default=SCHEMES[0], flag="--scheme")
+    solver: str | None = key(
+        "of pressure and diffusion", word(*SOLVERS), otherwise="by scheme", flag="--solver"
+    )
+    pressure_cycles: int = key(
+        "multigrid cycles a projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
+    )
+
+
+class ViscosityKeyTable(SceneTable):
+    """A viscosity at a time, instead of value and image; between them straight lines."""
+
+    time: float = key("when", number(0), unit="s", required=True)
+    value: float = key(_WHITE, number(0, VISCOSITY_LIMIT), unit=_AREA, required=True)
+    image: str | None = file_key(
+        "stiff where this picture is bright",
+    )
+
+
+class ViscosityTable(SceneTable):
+    """How stiff it is."""
+
+    value: float | None = key(
+        _WHITE,
+        number(0, VISCOSITY_LIMIT),
+        unit=_AREA,
+        otherwise=f"{VISCOSITY:g}; of a morph {MORPH_VISCOSITY:g}, of the command keyframes "
+        f"{KEYFRAME_VISCOSITY:g}, with an image {PAINTED_VISCOSITY:g}",
+        flag="--viscosity",
+    )
+    image: str | None = file_key(
+        "stiff where this picture is bright (self: the animated one)",
+        flag="--viscosity-image",
+        metavar="FILE|self",
+    )
+    floor: float = key(
+        "viscosity of the image's black",
+        number(0, VISCOSITY_LIMIT),
+        unit=_AREA,
+        default=0.0,
+        flag="--viscosity-floor",
+    )
+    invert: bool = key("stiff where the image is dark", flag(), default=False, flag="--invert-viscosity")
+    moves: bool = key("whether it moves with the picture", flag(), default=False, flag="--viscosity-moves")
+    keys: tuple[ViscosityKeyTable, ...] = array(ViscosityKeyTable, name="key")
+
+
+class FreezeTable(SceneTable):
+    """What stays in its place."""
+
+    mask: str = file_key("white stays, by degrees", required=True)
+    strength: float = key(
+        "drag of white", number(0, DRAG_LIMIT), unit="1/s", default=DRAG, form="--freeze MASK:strength"
+    )
+
+
+class EffectTable(SceneTable):
+    """Where forces act."""
+
+    mask: str = file_key("forces act where it is white", required=True, flag="--effect-mask", metavar="MASK")
+
+
+class TimeTable(SceneTable):
+    """When frames are shown."""
+
+    duration: float | None = key(
+        "length",
+        number(above=0),
+        unit="s",
+        otherwise="that of the last keyframe, or 2",
+        flag="--duration",
+    )
+    fps: float = key("frames a second", number(LEAST_FPS, FPS_LIMIT), default=SCENE_FPS, flag="--fps")
+    substeps: int | None = key(
+        "steps a frame",
+        whole(1, SUBSTEPS_LIMIT),
+        otherwise="steps of at most 1/96 s, with keyframes 1/48 s",
+        flag="--substeps",
+        not_in_morph=_OF_STEPS,
+    )
+    loop: str | None = key(
+        "how the end meets the beginning",
+        word(*LOOPS),
+        otherwise="not at all",
+        flag="--loop",
+        not_in_morph=_OF_LOOPS,
+    )
+
+
+class FramesTable(SceneTable):
+    """What they look like."""
+
+    width: int | None = key(
+        "their width", whole(1, SIZE_LIMIT), unit="px", otherwise="the picture's", flag="--width"
+    )
+    scale: float | None = key("their size as a factor, instead of width", number(above=0), flag="--scale")
+    filter: str = key(
+        "how the picture is read between pixels", word(*FILTERS), default=FILTER, flag="--filter"
+    )
+    edge: str = key("what lies beyond the picture", word(*EDGES), default=EDGE, flag="--edge")
+
+
+class GroupTable(SceneTable):
+    """Forces edited as one."""
+
+    name: str = key("what it is called", text(), required=True)
+    strength: float = key("factor on all", number(), default=1.0)
+    envelope: tuple[str, ...] = key("envelopes that all are multiplied by", names(), default=())
+
+
+class SourceTable(Factor, Ramps, Blow, Window, Spot):
+    """What pours a density in: a spot, or a picture."""
+
+    image: str | None = file_key(
+        "pours where this picture is bright, instead of a spot",
+    )
+    amount: float = key(
+        "density poured in all, at the brightest place", number(-AMOUNT_LIMIT, AMOUNT_LIMIT), default=1.0
+    )
+
+
+class DensityTable(SceneTable):
+    """Something dissolved in it, seen over the picture."""
+
+    name: str = key("what it is called", text(), required=True)
+    color: str | None = key("its colour", color(), otherwise=INK_CODE)
+    look: str = key("colours, or covers", word(*LOOKS), default=LOOKS[0])
+    diffusion: float = key("how fast it spreads", number(0, VISCOSITY_LIMIT), unit=_AREA, default=0.0)
+    image: str | None = file_key(
+        "there at the beginning where this picture is bright",
+    )
+    amount: float = key("density of the image's white", number(0, AMOUNT_LIMIT), default=1.0)
+    sources: tuple[SourceTable, ...] = array(SourceTable, name="source")
+
+
+class LayerTable(SceneTable):
+    """A picture or matte that goes through the same map."""
+
+    name: str = key("what it is called", text(), required=True)
+    file: str = file_key("the picture, stretched over the animated one", painting=False, required=True)
+    data: bool | None = key(
+        "whether its numbers are data, not colours", flag(), otherwise="true for one channel"
+    )
+
+
+class TracksTable(SceneTable):
+    """Points that are followed."""
+
+    points: tuple[Point, ...] = key("where they begin", _POINTS, unit="px", default=(), form="--track")
+
+
+class MoveTable(SceneTable):
+    """A point that should be somewhere; several of one point make a path."""
+
+    start: Point = key("its place in the untouched picture", POINT, name="from", unit="px", required=True)
+    to: Point = key("where it should be", POINT, unit="px", required=True)
+    time: float | None = key(
+        "when", number(above=0), unit="s", otherwise="that of all", not_in_morph=_OF_TIMES
+    )
+    weight: float = key("how much it counts beside others", number(above=0), default=1.0)
+
+
+class FoundTable(SceneTable):
+    """A force found before, as a saved scene has it: the search goes on from there."""
+
+    center: Point = key("where it acts", POINT, unit="px", required=True)
+    vector: Point = key("acceleration at its centre", POINT, unit="px/s^2", required=True)
+    radius: float = key("sigma of its Gaussian", number(above=0), unit="px", required=True)
+    start: float = key("when it begins", number(0), unit="s", required=True)
+    end: float = key("when it ends", number(above=0), unit="s", required=True)
+
+
+class KeyframesTable(SceneTable):
+    """Where points arrive: forces are found that take them there."""
+
+    moves: tuple[MoveTable, ...] = array(MoveTable, name="move")
+    points: str | None = file_key("moves in a CSV file: from x, y, to x, y, perhaps time", painting=False)
+    time: float | None = key(
+        "of moves that name none",
+        number(above=0),
+        unit="s",
+        otherwise="the duration",
+        not_in_morph=_OF_TIMES,
+    )
+    pins: tuple[Point, ...] = key(
+        "points that stay in their place until the last keyframe",
+        _POINTS,
+        unit="px",
+        default=(),
+        form="--pin",
+    )
+    tolerance: float | None = key(
+        "how far a point may end from its keyframe",
+        number(above=0),
+        unit="px",
+        otherwise=f"{512 * TOLERANCE:g}, of a picture of 512; a morph's {512 * MORPH_TOLERANCE:g}",
+        flag="--tolerance",
+    )
+    found: tuple[FoundTable, ...] = array(FoundTable, name="force")
+
+
+Curve = str | tuple[tuple[float, float], ...]
+"""A curve's name, or its keys."""
+
+
+class MorphTable(SceneTable):
+    """Another picture, into which this one flows; keyframes lead from points of this to points of it."""
+
+    to: str = file_key("the other picture", painting=False, required=True, form="B")
+    size: Point | None = key("frame size that its pixels refer to", _SIZE, unit="px", otherwise="its own")
+    fit: str = key("how it covers the frame", word(*FITS), default=FITS[0], flag="--fit")
+    warp_curve: Curve = key(
+        "how far points are on their ways: linear, ease, or [[s, 0 … 1], …]",
+        curve(CURVES),
+        default=EASE,
+        flag="--warp-curve",
+        metavar="CURVE",
+    )
+    blend_curve: Curve = key(
+        "how much of it is seen, the same",
+        curve(CURVES),
+        default=EASE,
+        flag="--blend-curve",
+        metavar="CURVE",
+    )
+    blend: str = key(
+        "what is mixed: light, or display values",
+        word(*BLEND_SPACES),
+        default=BLEND_SPACES[0],
+        flag="--blend",
+    )
+    timing: str | None = file_key("a mask, white where it happens first", form="--timing")
+    delay: float = key(
+        "how much later it happens where the mask is black, a part of the duration",
+        number(0, DELAY_LIMIT),
+        default=DELAY,
+        form="--timing MASK:DELAY",
+    )
+    reverse: bool = key("from the other picture to this", flag(), default=False, flag="--reverse")
+    pingpong: bool = key("there and back", flag(), default=False, flag="--pingpong")
+
+
+class OutputTable(SceneTable):
+    """What is written."""
+
+    file: str = file_key(
+        "x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report",
+        painting=False,
+        required=True,
+    )
+    of: str = key("picture, tracks, report, or the name of a layer or density", text(), default="picture")
+    start: int = key(
+        "number of a sequence's first frame", whole(0, 10**9), default=FIRST_FRAME, flag="--start"
+    )
+    type: str | None = key("numbers of a sequence", word(*TYPES), otherwise="the picture's", flag="--type")
+    compression: str | None = key("of EXR and TIFF sequences", text(), flag="--compression")
+    quality: int | None = key("of JPEG and WebP sequences", whole(1, 100), flag="--quality")
+
+    @property
+    def encoding(self) -> Encoding:
+        """How stills are written.
+
+        Raises:
+            PictureError: a value that no format has.
+        """
+        return Encoding(self.type, self.compression, self.quality)
+
+
+class SceneTables(SceneTable):
+    """A scene."""
+
+    wfluid: int = key("version of the format", version(VERSION), required=True)
+    seed: int = key(
+        "of noises that name none, and of keyframes", whole(0, SEED_LIMIT), default=0, flag="--seed"
+    )
+    picture: PictureTable = optional(PictureTable)
+    fluid: FluidTable = table(FluidTable)
+    viscosity: ViscosityTable = table(ViscosityTable)
+    freeze: FreezeTable | None = optional(FreezeTable)
+    effect: EffectTable | None = optional(EffectTable, not_in_morph=_OF_POINTS)
+    time: TimeTable = table(TimeTable)
+    frames: FramesTable = table(FramesTable)
+    envelopes: dict[str, EnvelopeTable] = mapping(ENVELOPES)
+    forces: tuple[ForceTable, ...] = array(FORCES, unique="name", name="force", not_in_morph=_OF_POINTS)
+    groups: tuple[GroupTable, ...] = array(GroupTable, unique="name", name="group", not_in_morph=_OF_POINTS)
+    densities: tuple[DensityTable, ...] = array(
+        DensityTable, unique="name", name="density", not_in_morph=_OF_POINTS
+    )
+    layers: tuple[LayerTable, ...] = array(LayerTable, unique="name", name="layer", not_in_morph=_OF_POINTS)
+    tracks: TracksTable = table(TracksTable, not_in_morph=_OF_POINTS)
+    keyframes: KeyframesTable | None = optional(KeyframesTable)
+    morph: MorphTable | None = optional(MorphTable)
+    outputs: tuple[OutputTable, ...] = array(OutputTable, name="output")
+
+
+SCENE = table_of(SceneTables)
+"""Everything a scene may say."""

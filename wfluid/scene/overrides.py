@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-
-from wfluid.scene.schema import SceneError, nearest
+from wfluid.scene.schema import SceneError
+from wfluid.scene.types import nearest
 
 
 def copied(tables: Any) -> Any:
@@ -20,6 +18,9 @@ def copied(tables: Any) -> Any:
 
 def parse_value(text: str) -> Any:
     """A TOML value; what is none is a text."""
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
     try:
         parsed = tomlkit.parse(f"value = {text}").unwrap()
         return parsed["value"] if len(parsed) == 1 else text

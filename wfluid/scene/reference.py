@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from wfluid.scene.format import SCENE
-from wfluid.scene.schema import Key, Many, Named, Table, Variants
+from wfluid.scene.schema import ArrayOf, Key, MapOf, Part, Table, Union
 
 
-def tables(what=SCENE, path: str = "") -> Iterator[tuple[str, str, Table]]:
+def tables(what: Part = SCENE, path: str = "") -> Iterator[tuple[str, str, Table]]:
     """Every table with keys: its heading in TOML, what it is for, and itself."""
-    if isinstance(what, Many | Named):
-        name = f"[{path}]" if isinstance(what, Many) else f"{path}.NAME"
-        yield from tables(what.each, name)
-    elif isinstance(what, Variants):
+    if isinstance(what, ArrayOf | MapOf):
+        yield from tables(what.each, f"[{path}]" if isinstance(what, ArrayOf) else f"{path}.NAME")
+    elif isinstance(what, Union):
         for kind, table in what.tables.items():
             yield f'[{path}] kind = "{kind}"', table.meaning, table
     elif isinstance(what, Table):
@@ -28,11 +27,11 @@ def reference() -> str:
     lines = []
     for heading, meaning, table in tables():
         lines += ["", f"### `{heading}`", "", f"{meaning}.", ""]
-        rows_ = [(name, key) for name, key in table.keys.items() if isinstance(key, Key)]
-        if rows_:
+        rows = [(name, key) for name, key in table.keys.items() if isinstance(key, Key)]
+        if rows:
             lines += ["| key | meaning | type | default |", "| --- | --- | --- | --- |"]
-        for name, key in rows_:
+        for name, key in rows:
             unit = f" [{key.unit}]" if key.unit else ""
-            default = "required" if key.required else key.default or ""
+            default = "required" if key.required else key.shown_default
             lines.append(f"| `{name}` | {key.meaning}{unit} | {key.type} | {default} |")
     return "\n".join(lines).strip() + "\n"

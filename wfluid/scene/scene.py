@@ -1,6 +1,6 @@
 """Scenes: one TOML file that says a whole shot.
 
-`scene_format` has the keys, `staging` makes the animation. Files are named relative to the scene's folder.
+`format` has the tables, `staging` makes the animation. Files are named relative to the scene's folder.
 """
 
 from __future__ import annotations
@@ -8,59 +8,64 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from wfluid.domain.timeline import Timeline
-from wfluid.files.names import FIRST_FRAME
-from wfluid.pictures.formats import Encoding, PictureError
-from wfluid.scene.format import SCENE
+from wfluid.scene.format import SCENE, SELF, SceneTables
+from wfluid.scene.names import check_morph, check_names
 from wfluid.scene.overrides import copied, parse_value, set_value
-from wfluid.scene.paths import files_renamed
-from wfluid.scene.schema import SceneError, SchemaError, checked, dotted, nearest
+from wfluid.scene.schema import (
+    Key,
+    SceneError,
+    SchemaError,
+    attributes_of,
+    blame,
+    checked,
+    dotted,
+    parts,
+    replaced,
+)
 
-SHOWN = ("picture", "tracks", "report")
-"""What an output may be of, beside layers and densities."""
-
-
-@dataclass(frozen=True)
-class Output:
-    """A file, or a sequence of files, that a scene writes."""
-
-    file: Path
-    """Its name."""
-    of: str = "picture"
-    """What it shows: "picture", "tracks", "report", or a layer's or a density's name."""
-    start: int = FIRST_FRAME
-    """Number of a sequence's first frame."""
-    encoding: Encoding = field(default_factory=Encoding)
-    """How stills are written."""
+DURATION = 2.0
+"""Length of a scene that names none, and whose keyframes name no time [s]."""
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Tables of a shot, checked against `scene_format.SCENE`.
+class Scene(SceneTables):
+    """A shot: its tables as attributes, such as `scene.fluid.cells`, and where it comes from.
 
     Raises:
         SceneError: a key that is unknown, missing or has a wrong value; names that do not fit together.
     """
 
     tables: Mapping[str, Any]
-    """Nested dictionaries and lists, as TOML gives them."""
-    folder: Path = Path()
+    """What was given: nested dictionaries and lists, as TOML has them."""
+    folder: Path
     """Where the names of files begin."""
-    source: str = "scene"
+    source: str
     """What to call it in messages."""
-    lines: Mapping[tuple, int] = field(default_factory=dict, repr=False, compare=False)
+    lines: Mapping[tuple, int]
     """Line of the file by a key's path, where known."""
-    flags: Mapping[tuple, str] = field(default_factory=dict, repr=False, compare=False)
+    flags: Mapping[tuple, str]
     """What of a command line a key's path comes from, where the scene is one."""
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        tables: Mapping[str, Any],
+        folder: Path = Path(),
+        source: str = "scene",
+        lines: Mapping[tuple, int] | None = None,
+        flags: Mapping[tuple, str] | None = None,
+    ):
+        """Check the tables, nested dictionaries and lists as TOML has them."""
+        vars(self).update(folder=folder, source=source, lines=lines or {}, flags=flags or {})
         try:
-            object.__setattr__(self, "tables", checked(SCENE, self.tables))
-            self._check_names()
+            vars(self)["tables"] = checked(SCENE, tables)
+            super().__init__(**attributes_of(SCENE, self.tables))
+            check_names(self)
+            if self.morph:
+                check_morph(self.tables)
         except SchemaError as error:
             raise self.error(error) from None
 
@@ -77,57 +82,13 @@ class Scene:
                 return SceneError(f"{self.source}:{self.lines[path[:end]]}: {error}")
         return SceneError(f"{self.source}: {error}")
 
-    def _check_names(self) -> None:
-        """Refuse names that nothing has."""
-        tables = self.tables
-        if "picture" not in tables:
-            raise SchemaError((), "[picture] is missing: what is animated")
-        groups = [group["name"] for group in tables.get("group", [])]
-        layers = [layer["name"] for layer in tables.get("layer", [])]
-        densities = [density["name"] for density in tables.get("density", [])]
-        envelopes = list(tables.get("envelopes", {}))
-        for n, force in enumerate(tables.get("force", [])):
-            _one_of(("force", n, "group"), force.get("group"), groups)
-            if force["kind"] == "buoyancy":
-                _one_of(("force", n, "density"), force["density"], densities)
-        for path, names in _envelope_uses(tables):
-            for name in names:
-                _one_of(path, name, envelopes)
-        for n, name in enumerate([*layers, *densities]):
-            kind, index = ("layer", n) if n < len(layers) else ("density", n - len(layers))
-            if name in SHOWN or name in [*layers, *densities][:n]:
-                raise SchemaError(
-                    (kind, index, "name"), f"{name!r} is taken: outputs could not tell them apart"
-                )
-        for n, output in enumerate(tables.get("output", [])):
-            _one_of(("output", n, "of"), output.get("of"), [*SHOWN, *layers, *densities])
-            if output.get("of") == "tracks" and not tables.get("tracks", {}).get("points"):
-                raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
+    def with_tables(self, tables: Mapping[str, Any]) -> Scene:
+        """A scene of other tables, from the same place.
 
-        if "morph" in tables:
-            self._check_morph(tables)
-
-    @staticmethod
-    def _check_morph(tables: Mapping[str, Any]) -> None:
-        """Refuse what a morph has no use for."""
-        keyframes = tables.get("keyframes", {})
-        if not (keyframes.get("move") or "points" in keyframes):
-            raise SchemaError(("keyframes",), "a morph needs points of both pictures: give move or points")
-        for key in ("force", "group", "density", "layer", "tracks", "effect"):
-            if tables.get(key):
-                raise SchemaError((key,), "a morph goes without: its flow follows from its points")
-        time, reason = tables.get("time", {}), "a morph goes without: its flow has steps of its own"
-        if "substeps" in time:
-            raise SchemaError(("time", "substeps"), reason)
-        if "loop" in time:
-            raise SchemaError(("time", "loop"), "a morph goes without: set pingpong of [morph]")
-        moves = [
-            ("keyframes", "move", n, "time")
-            for n, move in enumerate(keyframes.get("move", []))
-            if "time" in move
-        ]
-        for path in [*([("keyframes", "time")] if "time" in keyframes else []), *moves]:
-            raise SchemaError(path, "a morph goes without: its points arrive at its end")
+        Raises:
+            SceneError: as `Scene`.
+        """
+        return Scene(tables, self.folder, self.source, self.lines, self.flags)
 
     def with_values(self, settings: Sequence[str]) -> Scene:
         """The scene with some values set, each as "path=value"; the value is TOML, or else a text.
@@ -137,16 +98,20 @@ class Scene:
         Raises:
             SceneError: a setting without "=", a path that leads nowhere, or a value that is wrong.
         """
+        if not settings:
+            return self
         tables = copied(self.tables)
         for setting in settings:
             path, equals, value = setting.partition("=")
             if not equals or not path.strip():
                 raise SceneError(f"--set {setting!r}: expected key=value, such as time.duration=3")
             set_value(tables, path.strip().split("."), parse_value(value), setting)
-        return Scene(tables, self.folder, self.source, self.lines, self.flags)
+        return self.with_tables(tables)
 
     def writing(self, pictures: Sequence[str], report: str | None) -> Scene:
         """The scene with these outputs in the current folder, not its own of the picture; and a report."""
+        if not (pictures or report):
+            return self
         tables = copied(self.tables)
         outputs = tables.setdefault("output", [])
         here = [os.path.abspath(name) for name in pictures]
@@ -154,40 +119,22 @@ class Scene:
             outputs[:] = [output for output in outputs if output.get("of", "picture") != "picture"]
         outputs += [{"file": name} for name in here]
         outputs += [{"file": os.path.abspath(report), "of": "report"}] if report else []
-        return Scene(tables, self.folder, self.source, self.lines, self.flags)
+        return self.with_tables(tables)
 
-    def moved(self, folder: Path) -> Scene:
-        """The same scene for a file in another folder: its names of files begin there."""
+    def tables_in(self, folder: Path) -> dict[str, Any]:
+        """The tables of the same scene in another folder, where its names of files begin."""
 
         def renamed(name: str) -> str:
-            if os.path.isabs(name):
-                return name
-            return os.path.relpath(self.folder / name, folder)
+            return name if os.path.isabs(name) else os.path.relpath(self.folder / name, folder)
 
-        return Scene(files_renamed(SCENE, self.tables, renamed), folder, self.source, self.lines, self.flags)
+        return replaced(
+            SCENE, self.tables, lambda what, value: renamed(value) if _names_file(what, value) else value
+        )
 
     def files(self) -> list[Path]:
         """Every file that the scene reads."""
-        found: list[str] = []
-        files_renamed(SCENE, {**self.tables, "output": []}, lambda name: found.append(name) or name)
-        return [self.folder / name for name in found]
-
-    @property
-    def outputs(self) -> list[Output]:
-        """What is written.
-
-        Raises:
-            SceneError: an encoding that no format has.
-        """
-        found = []
-        for n, table in enumerate(self.tables.get("output", [])):
-            try:
-                encoding = Encoding(table.get("type"), table.get("compression"), table.get("quality"))
-            except PictureError as error:
-                raise self.error(SchemaError(("output", n), str(error))) from None
-            of, start = table.get("of", "picture"), table.get("start", FIRST_FRAME)
-            found.append(Output(self.folder / table["file"], of, start, encoding))
-        return found
+        read = {name: value for name, value in self.tables.items() if name != "output"}
+        return [self.folder / value for _, what, value in parts(SCENE, read) if _names_file(what, value)]
 
     @property
     def frame_count(self) -> int:
@@ -197,14 +144,7 @@ class Scene:
             SceneError: as `timeline`.
         """
         frames = self.timeline.frames
-        return 2 * frames - 2 if self.tables.get("morph", {}).get("pingpong") else frames
-
-    @property
-    def _last_keyframe(self) -> float | None:
-        """The latest time that keyframes name [s]; None if they name none."""
-        keyframes = self.tables.get("keyframes", {})
-        named = [table["time"] for table in (keyframes, *keyframes.get("move", [])) if "time" in table]
-        return max(named, default=None)
+        return 2 * frames - 2 if self.morph and self.morph.pingpong else frames
 
     @property
     def timeline(self) -> Timeline:
@@ -213,25 +153,27 @@ class Scene:
         Raises:
             SceneError: a length or a rate that makes no sense.
         """
-        time = self.tables.get("time", {})
-        fps, latest = time.get("fps", 15.0), self._last_keyframe
-        until = math.ceil(latest * fps - 1e-6) / fps if latest else 2.0  # no frame falls short of it
+        time, keyframes = self.time, self.keyframes
+        named = [one.time for one in (keyframes, *keyframes.moves) if one.time] if keyframes else []
+        # no frame falls short of the last keyframe
+        until = math.ceil(max(named) * time.fps - 1e-6) / time.fps if named else DURATION
+        duration = until if time.duration is None else time.duration
+        with self.blame("time"):
+            return Timeline(duration, time.fps, time.substeps)
+
+    @contextmanager
+    def blame(self, *path: str | int) -> Iterator[None]:
+        """Name the scene, its line and a key in what is refused within.
+
+        Raises:
+            SceneError: instead of what is refused.
+        """
         try:
-            return Timeline(time.get("duration", until), fps, time.get("substeps"))
-        except ValueError as error:
-            raise self.error(SchemaError(("time",), str(error))) from None
+            with blame(*path):
+                yield
+        except SchemaError as error:
+            raise self.error(error) from error
 
 
-def _one_of(path: tuple, name: str | None, known: Sequence[str]) -> None:
-    if name is not None and name not in known:
-        there = f"there is {', '.join(known)}" if known else "there is none"
-        raise SchemaError(path, f"{name!r}: no such {path[-1]}; {there}{nearest(name, known)}")
-
-
-def _envelope_uses(tables: Mapping[str, Any]) -> Iterator[tuple[tuple, list[str]]]:
-    for kind in ("force", "group"):
-        for n, table in enumerate(tables.get(kind, [])):
-            yield (kind, n, "envelope"), table.get("envelope", [])
-    for n, density in enumerate(tables.get("density", [])):
-        for m, source in enumerate(density.get("source", [])):
-            yield ("density", n, "source", m, "envelope"), source.get("envelope", [])
+def _names_file(what: Any, value: Any) -> bool:
+    return isinstance(what, Key) and bool(what.file) and not (what.file == "painting" and value == SELF)

@@ -1,20 +1,21 @@
-"""What a file of tables may say: keys with types, ranges and units, and refusals that name the key.
+"""Tables of a scene as classes, whose fields say all there is to say of a key.
 
-A `Table` is checked against nested dictionaries as TOML gives them. What is wrong is refused with the
-key's path, such as `force.2.radius`, and the nearest key or word there is.
+A field made by `key` has type, range, unit, default and words for people; `table`, `array`, `mapping` and
+`optional` hold further tables. From the fields come the check of nested dictionaries as TOML gives them,
+the objects made from them, the reference and the flags of the command line. What is wrong is refused with
+the key's path, such as `force.2.radius`, and the nearest key or word there is.
 """
 
 from __future__ import annotations
 
-import difflib
-import math
-import sys
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar, dataclass_transform
 
-LARGEST = sys.float_info.max
-"""Largest number: TOML's integers may be larger."""
+from wfluid.scene.types import Type, nearest, text
+from wfluid.system.errors import FileError
 
 
 class SchemaError(ValueError):
@@ -28,9 +29,37 @@ class SchemaError(ValueError):
         super().__init__(f"{dotted(path)}: {reason}")
 
 
+class SceneError(ValueError):
+    """A scene that cannot be read or makes no sense; the message names file, line where known, and key."""
+
+
 def dotted(path: Sequence[str | int]) -> str:
     """A path as a person writes it."""
     return ".".join(map(str, path)) or "the file"
+
+
+@contextmanager
+def blame(*path: str | int, file: str = "") -> Iterator[None]:
+    """Name a key, or a file, in what is refused within.
+
+    A file that cannot be read has its name already; a key with a `file` has both.
+
+    Raises:
+        SchemaError: instead of what is refused, where a path is given; else a ValueError with the file.
+    """
+    try:
+        yield
+    except SchemaError:
+        raise
+    except (ValueError, TypeError) as error:
+        if isinstance(error, FileError) and path:
+            raise
+        reason = str(error)
+        reason = reason if file in reason else f"{file}: {reason}"
+        raise (SchemaError(path, reason) if path else ValueError(reason)) from error
+
+
+# What a scene may say
 
 
 @dataclass(frozen=True)
@@ -39,18 +68,43 @@ class Key:
 
     meaning: str
     """What it is for, in a few words."""
-    check: Callable[[Any], Any]
-    """Gives the value as it is kept; raises ValueError with what was expected."""
-    type: str = ""
-    """What is expected, for people."""
+    kind: Type
+    """What it may be."""
     unit: str = ""
     """Unit."""
     default: Any = None
-    """What it is when left out, for people; None where that needs no word."""
+    """What it is when left out; None where that is no one value."""
+    otherwise: str = ""
+    """What it is when left out, in words, where that is no one value."""
     required: bool = False
     """Whether it must be there."""
     file: str = ""
     """"file" where it names one, relative to the scene's folder; "painting" where `self` is none."""
+    flag: str = ""
+    """The flag of the command line that sets it and nothing else."""
+    metavar: str | None = None
+    """What stands for the value in the flag's help."""
+    form: str = ""
+    """What of a command line says it, where that says more than this key."""
+
+    @property
+    def check(self):
+        """Gives the value as it is kept; raises ValueError with what was expected."""
+        return self.kind.check
+
+    @property
+    def type(self) -> str:
+        """What is expected, for people."""
+        return self.kind.text
+
+    @property
+    def shown_default(self) -> str:
+        """What it is when left out, for people."""
+        if self.default in (None, ()):
+            return self.otherwise
+        if isinstance(self.default, bool):
+            return str(self.default).lower()
+        return self.default if isinstance(self.default, str) else f"{self.default:g}"
 
 
 @dataclass(frozen=True)
@@ -59,149 +113,177 @@ class Table:
 
     meaning: str
     """What it is for."""
-    keys: Mapping[str, Key | Table | Many | Named | Variants] = field(default_factory=dict)
+    keys: Mapping[str, Key | Table | ArrayOf | MapOf | Union]
     """What may be in it."""
+    make: type[SceneTable]
+    """The class of its objects."""
+    attributes: Mapping[str, str]
+    """The attribute of the object, by key."""
+    not_in_morph: Mapping[str, str]
+    """Why a morph has no use for a key, by key."""
 
 
 @dataclass(frozen=True)
-class Many:
+class ArrayOf:
     """An array of tables."""
 
-    each: Table | Variants
+    each: Table | Union
     """What each is."""
     unique: str | None = None
     """A key whose values must differ."""
 
 
 @dataclass(frozen=True)
-class Named:
+class MapOf:
     """Tables under names of the user's choice."""
 
-    each: Table | Variants
+    each: Table | Union
     """What each is."""
 
 
 @dataclass(frozen=True)
-class Variants:
+class Union:
     """A table whose key `kind` says which."""
 
     meaning: str
     """What it is for."""
     tables: Mapping[str, Table]
     """By kind."""
-    default: str | None = None
-    """The kind when left out."""
 
 
-def number(least: float = -math.inf, most: float = math.inf, above: float | None = None) -> dict[str, Any]:
-    """The type of a finite number within a range; `above` excludes its lower end."""
-
-    def check(value: Any) -> float:
-        wrong = isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST
-        if wrong or not least <= value <= most or (above is not None and value <= above):
-            raise ValueError(f"expected {kind}")
-        return value
-
-    low = f"above {above:g}" if above is not None else f"from {least:g}" if least > -math.inf else ""
-    high = f"to {most:g}" if most < math.inf else ""
-    kind = " ".join(part for part in ("a number", low, high) if part)
-    return {"check": check, "type": kind}
+Part = Key | Table | ArrayOf | MapOf | Union
 
 
-def whole(least: int, most: int) -> dict[str, Any]:
-    """The type of a whole number within a range."""
-
-    def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-            raise ValueError(f"expected {kind}")
-        return value
-
-    kind = f"a whole number from {least} to {most}"
-    return {"check": check, "type": kind}
+# Tables as classes
 
 
-def text() -> dict[str, Any]:
-    """The type of a text that is not empty."""
+@dataclass(frozen=True)
+class Field:
+    """What a class of tables says of one of its attributes."""
 
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or not value.strip() or not value.isprintable():
-            raise ValueError("expected a text on one line")
-        return value
-
-    return {"check": check, "type": "a text"}
-
-
-def flag() -> dict[str, Any]:
-    """The type of true or false."""
-
-    def check(value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError("expected true or false")
-        return value
-
-    return {"check": check, "type": "true or false"}
+    what: Part
+    """What may be there."""
+    name: str = ""
+    """The key, where it is not called as the attribute."""
+    default: Callable[[], Any] = lambda: None
+    """Makes what it is when left out."""
+    not_in_morph: str = ""
+    """Why a morph has no use for it, if it has none."""
 
 
-def word(*words: str) -> dict[str, Any]:
-    """The type of one of some words."""
-
-    def check(value: Any) -> str:
-        if value not in words:
-            raise ValueError(f"expected one of {', '.join(words)}{nearest(value, words)}")
-        return value
-
-    return {"check": check, "type": " or ".join(words)}
+def key(meaning: str, kind: Type, *, name: str = "", not_in_morph: str = "", **more: Any) -> Any:
+    """An attribute with a value; `more` is of `Key`."""
+    what = Key(meaning, kind, **more)
+    return Field(what, name, lambda: what.default, not_in_morph)
 
 
-def numbers(count: int, what: str) -> dict[str, Any]:
-    """The type of so many finite numbers."""
-    one = number()["check"]
-
-    def check(value: Any) -> list[float]:
-        try:
-            if not isinstance(value, list) or len(value) != count:
-                raise ValueError
-            return [one(item) for item in value]
-        except ValueError:
-            raise ValueError(f"expected {what}") from None
-
-    return {"check": check, "type": what}
+def file_key(meaning: str, *, painting: bool = True, **more: Any) -> Any:
+    """An attribute with the name of a file; of a painting, `self` is the picture that is animated."""
+    return key(meaning, text(), file="painting" if painting else "file", **more)
 
 
-def rows(count: int, least: int, what: str) -> dict[str, Any]:
-    """The type of a list of `least` or more rows of `count` numbers each; of one each, plain numbers."""
-    row = number()["check"] if count == 1 else numbers(count, what)["check"]
-
-    def check(value: Any) -> list:
-        try:
-            if not isinstance(value, list) or len(value) < least:
-                raise ValueError
-            return [row(item) for item in value]
-        except ValueError:
-            raise ValueError(f"expected {what}") from None
-
-    return {"check": check, "type": what}
+def table(of: type[SceneTable], not_in_morph: str = "") -> Any:
+    """An attribute with a table, which has its defaults where it is left out."""
+    return Field(table_of(of), "", of, not_in_morph)
 
 
-def names() -> dict[str, Any]:
-    """The type of one name, or a list of names."""
-
-    def check(value: Any) -> list[str]:
-        found = value if isinstance(value, list) else [value]
-        if not found or not all(isinstance(item, str) and item for item in found):
-            raise ValueError("expected a name, or a list of names")
-        return found
-
-    return {"check": check, "type": "a name or a list of names"}
+def optional(of: type[SceneTable], not_in_morph: str = "") -> Any:
+    """An attribute with a table, None where it is left out."""
+    return Field(table_of(of), not_in_morph=not_in_morph)
 
 
-def nearest(value: Any, known: Sequence[str]) -> str:
-    """Ask for the most similar of what is known, if there is one."""
-    near = difflib.get_close_matches(str(value), list(known), n=1, cutoff=0.5)
-    return f"; did you mean {near[0]}?" if near else ""
+def array(
+    of: type[SceneTable] | Union, *, name: str, unique: str | None = None, not_in_morph: str = ""
+) -> Any:
+    """An attribute with an array of tables, a tuple."""
+    each = of if isinstance(of, Union) else table_of(of)
+    return Field(ArrayOf(each, unique), name, tuple, not_in_morph)
 
 
-def checked(what: Table | Many | Named | Variants | Key, value: Any, path: tuple = ()) -> Any:
+def mapping(of: Union) -> Any:
+    """An attribute with tables by names of the user's choice."""
+    return Field(MapOf(of), default=dict)
+
+
+@dataclass_transform(
+    kw_only_default=True,
+    frozen_default=True,
+    field_specifiers=(key, file_key, table, optional, array, mapping),
+)
+class SceneTable:
+    """Base of a scene's tables: what `key` and the like say of a class is an attribute of its objects.
+
+    Attributes are keywords; what is left out has its default. The docstring is what the table is for.
+    """
+
+    fields: ClassVar[Mapping[str, Field]] = {}
+    """By attribute, those of bases first."""
+    trailing: ClassVar[bool] = False
+    """Whether the keys of a base are listed after those of the tables made from it."""
+    given: frozenset[str]
+    """Attributes that were given."""
+
+    def __init_subclass__(cls) -> None:
+        """Collect the fields."""
+        cls.fields = {
+            name: one
+            for base in reversed(cls.__mro__)
+            for name, one in vars(base).items()
+            if isinstance(one, Field)
+        }
+
+    def __init__(self, **given: Any):
+        """Take what is given.
+
+        Raises:
+            TypeError: an attribute that there is not, or a required one that is missing.
+        """
+        required = {
+            name for name, one in self.fields.items() if isinstance(one.what, Key) and one.what.required
+        }
+        if wrong := (given.keys() - self.fields.keys()) | (required - given.keys()):
+            raise TypeError(f"{type(self).__name__}: unknown or missing: {', '.join(sorted(wrong))}")
+        vars(self)["given"] = frozenset(given)
+        for name, one in self.fields.items():
+            vars(self)[name] = given[name] if name in given else one.default()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__}.{name} cannot be set")
+
+    def __repr__(self) -> str:
+        shown = (f"{name}={getattr(self, name)!r}" for name in self.fields if name in self.given)
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    def gives(self, *attributes: str) -> bool:
+        """Whether one of these was given."""
+        return not self.given.isdisjoint(attributes)
+
+
+def union(meaning: str, *classes: type[SceneTable]) -> Union:
+    """A table of one of some kinds, each called as its class says."""
+    return Union(meaning, {one.kind: table_of(one) for one in classes})
+
+
+@cache
+def table_of(of: type[SceneTable]) -> Table:
+    """What the fields of a class say."""
+    bases = [base for base in of.__mro__[1:] if vars(base).get("trailing")]
+    late = {attribute for base in bases for attribute in base.fields}
+    fields = dict(sorted(of.fields.items(), key=lambda item: item[0] in late))
+    names = {attribute: one.name or attribute for attribute, one in fields.items()}
+    return Table(
+        (of.__doc__ or "").partition("\n")[0].rstrip("."),
+        {names[attribute]: one.what for attribute, one in fields.items()},
+        of,
+        {name: attribute for attribute, name in names.items()},
+        {names[attribute]: one.not_in_morph for attribute, one in fields.items() if one.not_in_morph},
+    )
+
+
+# Checking and making
+
+
+def checked(what: Part, value: Any, path: tuple = ()) -> Any:
     """The value as plain dictionaries and lists, with what each key's check makes of it.
 
     Raises:
@@ -213,7 +295,7 @@ def checked(what: Table | Many | Named | Variants | Key, value: Any, path: tuple
         except ValueError as error:
             shown = repr(value) if len(repr(value)) <= 60 else repr(value)[:57] + "…"
             raise SchemaError(path, f"{shown}: {error}", about_value=True) from None
-    if isinstance(what, Many):
+    if isinstance(what, ArrayOf):
         if not isinstance(value, list):
             raise SchemaError(path, f"expected a list of tables, [[{dotted(path)}]]")
         found = [checked(what.each, item, (*path, n)) for n, item in enumerate(value)]
@@ -221,45 +303,101 @@ def checked(what: Table | Many | Named | Variants | Key, value: Any, path: tuple
         return found
     if not isinstance(value, Mapping):
         raise SchemaError(path, f"expected a table, [{dotted(path)}]")
-    if isinstance(what, Named):
+    if isinstance(what, MapOf):
         return {name: checked(what.each, item, (*path, name)) for name, item in value.items()}
-    if isinstance(what, Variants):
-        return _variant(what, value, path)
-    return _table(what, value, path)
+    if isinstance(what, Union):
+        return _checked_kind(what, value, path)
+    return _checked_keys(what, value, path)
 
 
-def _variant(what: Variants, value: Mapping, path: tuple) -> dict:
-    kind = value.get("kind", what.default)
+def _checked_kind(what: Union, value: Mapping, path: tuple) -> dict:
+    kind = value.get("kind")
     if kind is None:
         raise SchemaError(path, f"kind is missing: expected one of {', '.join(what.tables)}")
     if not isinstance(kind, str) or kind not in what.tables:
         reason = f"{kind!r}: expected one of {', '.join(what.tables)}{nearest(kind, list(what.tables))}"
         raise SchemaError((*path, "kind"), reason)
-    rest = {name: item for name, item in value.items() if name != "kind"}
-    return {"kind": str(kind), **_table(what.tables[str(kind)], rest, path)}
+    return {"kind": str(kind), **_checked_keys(what.tables[str(kind)], _without_kind(value), path)}
 
 
-def _table(what: Table, value: Mapping, path: tuple) -> dict:
+def _without_kind(value: Mapping) -> dict:
+    return {name: item for name, item in value.items() if name != "kind"}
+
+
+def _checked_keys(what: Table, value: Mapping, path: tuple) -> dict:
     for name in value:
         if name not in what.keys:
             there = f"; there is {', '.join(what.keys)}" if what.keys else ""
             raise SchemaError((*path, name), f"no such key{nearest(name, list(what.keys)) or there}")
-    for name, key in what.keys.items():
-        if isinstance(key, Key) and key.required and name not in value:
-            raise SchemaError(path, f"{name} is missing: {key.meaning}")
+    for name, one in what.keys.items():
+        if isinstance(one, Key) and one.required and name not in value:
+            raise SchemaError(path, f"{name} is missing: {one.meaning}")
     return {str(name): checked(what.keys[name], item, (*path, str(name))) for name, item in value.items()}
 
 
-def _refuse_twins(key: str | None, found: Sequence[Mapping], path: tuple) -> None:
+def _refuse_twins(name: str | None, found: Sequence[Mapping], path: tuple) -> None:
     seen: dict[Any, int] = {}
-    for n, table in enumerate(found):
-        name = table.get(key) if key else None
-        if name is None:
+    for n, item in enumerate(found):
+        value = item.get(name) if name else None
+        if value is None:
             continue
-        if name in seen:
-            raise SchemaError((*path, n, key), f"{name!r} is the name of {dotted((*path, seen[name]))} too")
-        seen[name] = n
+        if value in seen:
+            raise SchemaError(
+                (*path, n, name), f"{value!r} is the name of {dotted((*path, seen[value]))} too"
+            )
+        seen[value] = n
 
 
-class SceneError(ValueError):
-    """A scene that cannot be read or makes no sense; the message names file, line where known, and key."""
+def made(what: Part, value: Any) -> Any:
+    """The objects of a checked value: tables as their classes, arrays as tuples."""
+    if isinstance(what, Key):
+        return _as_tuples(value)
+    if isinstance(what, ArrayOf):
+        return tuple(made(what.each, item) for item in value)
+    if isinstance(what, MapOf):
+        return {name: made(what.each, item) for name, item in value.items()}
+    if isinstance(what, Union):
+        return made(what.tables[value["kind"]], _without_kind(value))
+    return what.make(**attributes_of(what, value))
+
+
+def attributes_of(what: Table, value: Mapping) -> dict[str, Any]:
+    """The attributes of the object that a checked table makes."""
+    return {what.attributes[name]: made(what.keys[name], item) for name, item in value.items()}
+
+
+def _as_tuples(value: Any) -> Any:
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
+
+
+def parts(what: Part, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Part, Any]]:
+    """Every part of a checked value: its path, what it is, and its value."""
+    yield path, what, value
+    if isinstance(what, ArrayOf | MapOf):
+        items = enumerate(value) if isinstance(what, ArrayOf) else value.items()
+        for name, item in items:
+            yield from parts(what.each, item, (*path, name))
+    elif isinstance(what, Table | Union):
+        keys = keys_of(what, value)
+        for name in keys:
+            if name in value:
+                yield from parts(keys[name], value[name], (*path, name))
+
+
+def replaced(what: Part, value: Any, change: Callable[[Key, Any], Any]) -> Any:
+    """The checked value with what `change` makes of each value of a key."""
+    if isinstance(what, Key):
+        return change(what, value)
+    if isinstance(what, ArrayOf):
+        return [replaced(what.each, item, change) for item in value]
+    if isinstance(what, MapOf):
+        return {name: replaced(what.each, item, change) for name, item in value.items()}
+    keys = keys_of(what, value)
+    return {
+        name: replaced(keys[name], item, change) if name in keys else item for name, item in value.items()
+    }
+
+
+def keys_of(what: Table | Union, value: Mapping) -> Mapping[str, Part]:
+    """The keys that a table may have, but for its kind."""
+    return (what.tables[value["kind"]] if isinstance(what, Union) else what).keys

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from wfluid.scene.format import FORCES
+from wfluid.scene.forces import FORCES
 from wfluid.scene.schema import SchemaError, checked
+from wfluid.scene.types import as_number
 
 FORMS = {
     "push": ("X,Y:DX,DY", "center", "by"),
@@ -20,10 +21,8 @@ FORMS = {
 }
 """By kind: how it is written, and the keys of what comes before the options."""
 
-_DENSITY_KEYS = ("diffusion", "lift")
-"""Keys of a poured density that are not its source's."""
-
-_SOURCE_KEYS = ("radius", "amount", "start", "end", "at", "rise", "fall", "strength")
+DENSITY_OPTIONS = ("radius", "amount", "start", "end", "at", "rise", "fall", "strength", "diffusion", "lift")
+"""Keys that may follow a short form of a poured density: its source's, its own, and `lift`."""
 
 _UNWRITTEN = ("path", "envelope", "points", "name", "group")
 """Keys that have no short form."""
@@ -35,14 +34,25 @@ def parse_force(kind: str, text: str) -> dict[str, Any]:
     Raises:
         ValueError: naming the part that is wrong.
     """
-    what = f"{kind} {text!r}"
-    _, *positional = FORMS[kind]
-    keys = [key for key in FORCES[kind].keys if key not in (*positional, *_UNWRITTEN)]
-    table = _parsed(kind, text, keys)
     try:
-        return {"kind": kind, **checked(FORCES[kind], table)}
+        return checked(FORCES, read_force(kind, text))
     except SchemaError as error:
-        raise ValueError(f"{what}: {error}") from None
+        raise ValueError(f"{kind} {text!r}: {error}") from None
+
+
+def read_force(kind: str, text: str) -> dict[str, Any]:
+    """The table of a force from its short form, whose values a scene has yet to check.
+
+    Raises:
+        ValueError: naming the part that is no short form.
+    """
+    return {"kind": kind, **_parsed(kind, text, force_options(kind))}
+
+
+def force_options(kind: str) -> list[str]:
+    """Keys that may follow a short form of a kind of force, as key=value,…"""
+    _, *positional = FORMS[kind]
+    return [key for key in FORCES.tables[kind].keys if key not in (*positional, *_UNWRITTEN)]
 
 
 def parse_density(look: str, text: str, name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
@@ -53,7 +63,7 @@ def parse_density(look: str, text: str, name: str) -> tuple[dict[str, Any], dict
     Raises:
         ValueError: naming the part that is wrong.
     """
-    source = _parsed(look, text, [*_SOURCE_KEYS, *_DENSITY_KEYS])
+    source = _parsed(look, text, list(DENSITY_OPTIONS))
     density = {"name": name, "color": source.pop("color"), "look": look}
     if "diffusion" in source:
         density["diffusion"] = source.pop("diffusion")
@@ -87,7 +97,7 @@ def _part(what: str, key: str, part: str) -> Any:
         return [as_pair(what, "a point X,Y", point) for point in part.split("/")]
     if key == "center":
         return as_pair(what, "the point X,Y", part)
-    return as_pair(what, "the arrow DX,DY", part) if key == "by" else as_number(what, key, part)
+    return as_pair(what, "the arrow DX,DY", part) if key == "by" else as_number(f"{what}: {key}", part)
 
 
 def _options(what: str, text: str, keys: list[str]) -> dict[str, Any]:
@@ -105,7 +115,7 @@ def _options(what: str, text: str, keys: list[str]) -> dict[str, Any]:
 def _option(what: str, key: str, value: str) -> Any:
     if key in ("mask", "along"):
         return value
-    return int(value) if key == "seed" and value.isdecimal() else as_number(what, key, value)
+    return int(value) if key == "seed" and value.isdecimal() else as_number(f"{what}: {key}", value)
 
 
 def as_pair(what: str, name: str, part: str) -> list[float]:
@@ -117,22 +127,7 @@ def as_pair(what: str, name: str, part: str) -> list[float]:
     numbers = part.split(",")
     if len(numbers) != 2:
         raise ValueError(f"{what}: {name} needs two numbers, got {part!r}")
-    return [as_number(what, name, number) for number in numbers]
-
-
-def as_number(what: str, name: str, part: str) -> float:
-    """A finite number.
-
-    Raises:
-        ValueError: no number; begins with `what`.
-    """
-    try:
-        value = float(part)
-    except ValueError:
-        raise ValueError(f"{what}: {name}: {part!r} is not a number") from None
-    if value - value != 0:
-        raise ValueError(f"{what}: {name}: {part} is not finite")
-    return value
+    return [as_number(f"{what}: {name}", number) for number in numbers]
 
 
 def parse_move(text: str) -> dict[str, Any]:
@@ -147,4 +142,4 @@ def parse_move(text: str) -> dict[str, Any]:
     if len(parts) != 2:
         raise ValueError(f"{what}: expected X0,Y0:X1,Y1 or X0,Y0:X1,Y1@SECONDS")
     start, end = (as_pair(what, "a point X,Y", part) for part in parts)
-    return {"from": start, "to": end, **({"time": as_number(what, "time", time)} if at else {})}
+    return {"from": start, "to": end, **({"time": as_number(f"{what}: time", time)} if at else {})}

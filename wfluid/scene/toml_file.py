@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import tomllib
 from pathlib import Path
 
 import tomlkit
 from tomlkit.exceptions import ParseError, TOMLKitError
 
-from wfluid.pictures.formats import PictureError
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SceneError
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write_text
 
 
 def read_scene(path: str | os.PathLike) -> Scene:
@@ -36,7 +36,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
         reason = re.sub(r" at line \d+ col \d+$", "", str(error))
         raise SceneError(f"{path}:{error.line}:{error.col}: no TOML: {reason}") from None
     except TOMLKitError as error:
-        raise SceneError(f"{path}:{_line_of_failure(text)}:1: no TOML: {error}") from None
+        raise SceneError(f"{path}:{_line_and_column(text)}: no TOML: {error}") from None
     return Scene(tables, path.parent, str(path), _lines_of(text))
 
 
@@ -44,30 +44,23 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
     """Write a scene as TOML, whole or not at all, its names of files relative to it.
 
     Raises:
-        PictureError: the file cannot be written.
+        FileError: the file cannot be written.
     """
     path = Path(path)
     document = tomlkit.document()
-    for key, value in scene.moved(path.parent).tables.items():
+    for key, value in scene.tables_in(path.parent).items():
         document[key] = value
+    atomic_write_text(path, tomlkit.dumps(document))
+
+
+def _line_and_column(text: str) -> str:
+    """Where a well-formed text is wrong, such as a key given twice, of which tomlkit says no place."""
     try:
-        with atomic_file(path) as temporary:
-            temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
-    except OSError as error:
-        raise PictureError(f"{path}: cannot be written ({error.strerror})") from error
-
-
-def _line_of_failure(text: str) -> int:
-    """The first line that makes a text wrong which is well formed, such as a key given twice."""
-    lines = text.splitlines(keepends=True)
-    for number in range(1, len(lines)):
-        try:
-            tomlkit.parse("".join(lines[:number]))
-        except ParseError:
-            continue  # the middle of a value of several lines
-        except TOMLKitError:
-            return number
-    return len(lines)
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        if place := re.search(r"at line (\d+), column (\d+)", str(error)):
+            return f"{place[1]}:{place[2]}"
+    return "1:1"
 
 
 _HEADING = re.compile(r"""^\s*\[(\[)?([\w."'\s-]+)\]\]?\s*(#.*)?$""")

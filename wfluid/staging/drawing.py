@@ -1,4 +1,4 @@
-"""Forces as a person draws them on the picture, in pixels and seconds: tables of `scene_format.FORCES`.
+"""Forces as a person draws them on the picture, in pixels and seconds: tables of `scene.forces`.
 
 What is drawn is how far something would be carried by that force alone: the centre by the arrow of a
 push, a turn of a vortex's centre, the typical way of noise. Pressure takes half of a Gaussian push (in
@@ -9,34 +9,48 @@ so it is twice what a free particle would need; viscosity and walls then shorten
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, Oscillator, product
+from wfluid.domain.limits import IMAGE_BLUR, IMAGE_LENGTH, NOISE_SCALE, RADIUS
 from wfluid.domain.paths import Center, Path
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import GaussianForce, Growth, VortexForce
-from wfluid.model.image_force import DEFAULT_RADIUS as DEFAULT_BLUR
 from wfluid.model.image_force import ImageForce
 from wfluid.model.noise_force import NoiseForce
 from wfluid.model.painted import Freeze, Painted
 from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Buoyancy, Wind
 from wfluid.pictures.picture import resample
-from wfluid.staging.images import SceneImages, named
-from wfluid.staging.timing import envelope_and_scale, time_window
-
-DEFAULT_RADIUS = 0.06
-"""Radius of a force that names none [longer side]."""
-
-DEFAULT_SCALE = 0.2
-"""Mean wavelength of noise that names none [longer side]."""
-
-DEFAULT_LENGTH = 0.02
-"""How far a painted force carries its strongest place where it does not say it [longer side]."""
+from wfluid.scene.forces import (
+    FORCES,
+    BuoyancyTable,
+    ConstantTable,
+    EnvelopeTable,
+    Factor,
+    ForceTable,
+    GrowTable,
+    ImageTable,
+    Masked,
+    NoiseTable,
+    OscillatorTable,
+    PushTable,
+    Ramps,
+    Row,
+    SamplesTable,
+    Spot,
+    StrokeTable,
+    Timing,
+    VortexTable,
+    WindTable,
+)
+from wfluid.scene.schema import blame, checked, made
+from wfluid.staging.images import SceneImages
+from wfluid.staging.timing import envelope_and_scale, phase_of, time_window
 
 _PRESSURE = 2.0
 
@@ -64,7 +78,7 @@ class Drawing:
     """Where forces act that name no mask."""
     frozen: Freeze | None = None
     """What stays where it is: no growth acts there."""
-    paintings: SceneImages | None = None
+    images: SceneImages | None = None
     """Reads the pictures that forces name."""
 
     @property
@@ -72,37 +86,42 @@ class Drawing:
         """The frame's longer side [px]."""
         return max(self.width, self.height)
 
-    def force(self, table: Mapping[str, Any]) -> Force:
-        """The force that a table draws.
+    def force(self, force: ForceTable | Mapping[str, Any], seed: int = 0) -> Force:
+        """The force that a table draws: a scene's, or a dictionary such as `parse_force` gives.
+
+        `seed` is that of noise which names none.
 
         Raises:
-            ValueError: a place outside the picture, a window outside the animation, keys that contradict.
+            ValueError: a key that is wrong, a place outside the picture, a window outside the animation,
+                keys that contradict.
         """
+        if isinstance(force, Mapping):
+            force = made(FORCES, checked(FORCES, force))
         make = {
-            "push": self._push,
-            "vortex": self._vortex,
-            "grow": self._grow,
-            "stroke": self._stroke,
-            "wind": self._wind,
-            "noise": self._noise,
-            "image": self._image,
-            "buoyancy": self._buoyancy,
-        }[table["kind"]]
-        return make(table)
+            PushTable: self._push,
+            VortexTable: self._vortex,
+            GrowTable: self._grow,
+            StrokeTable: self._stroke,
+            WindTable: self._wind,
+            NoiseTable: lambda noise: self._noise(noise, seed),
+            ImageTable: self._image,
+            BuoyancyTable: self._buoyancy,
+        }[type(force)]
+        return make(force)
 
-    def center(self, what: str, table: Mapping[str, Any]) -> Center:
+    def center(self, what: str, spot: Spot) -> Center:
         """Where a spot is [longer side].
 
         Raises:
             ValueError: neither a center nor a path, both, or a place outside the picture.
         """
-        if ("center" in table) == ("path" in table):
+        if (spot.center is None) == (spot.path is None):
             raise ValueError(f"{what}: expected either center or path")
-        if "center" in table:
-            return self.place(what, table["center"])
-        return self._path(what, table["path"])
+        if spot.path is None:
+            return self.place(what, spot.center)
+        return self._path(what, spot.path)
 
-    def place(self, what: str, at: list[float]) -> tuple[float, float]:
+    def place(self, what: str, at: Sequence[float]) -> tuple[float, float]:
         """A place [longer side] from pixels.
 
         Raises:
@@ -114,24 +133,24 @@ class Drawing:
             )
         return at[0] / self.side, at[1] / self.side
 
-    def radius(self, table: Mapping[str, Any]) -> float:
+    def radius(self, spot: Spot | StrokeTable) -> float:
         """The radius of a spot [longer side]."""
-        return table["radius"] / self.side if "radius" in table else DEFAULT_RADIUS
+        return self._length(spot.radius, RADIUS)
 
-    def envelope_and_scale(self, what: str, table: Mapping[str, Any]) -> tuple[Envelope, float]:
+    def envelope_and_scale(self, what: str, timing: Timing) -> tuple[Envelope, float]:
         """The envelope, with those it names and its strength, and what carries a free particle by one."""
-        envelope, per_length = envelope_and_scale(what, table, self.duration, self.scheme, self.loop)
-        return self.modulated(what, envelope, table), per_length
+        envelope, per_length = envelope_and_scale(what, timing, self.duration, self.scheme, self.loop)
+        return self.modulated(what, envelope, timing), per_length
 
-    def modulated(self, what: str, envelope: Envelope, table: Mapping[str, Any]) -> Envelope:
+    def modulated(self, what: str, envelope: Envelope, factor: Factor) -> Envelope:
         """The envelope times those that a table names, and its strength.
 
         Raises:
             ValueError: an envelope that does not exist.
         """
-        return product(table.get("strength", 1.0), envelope, *self.named(what, table.get("envelope", ())))
+        return product(factor.strength, envelope, *self.named(what, factor.envelope))
 
-    def named(self, what: str, names: list[str]) -> list[Envelope]:
+    def named(self, what: str, names: Sequence[str]) -> list[Envelope]:
         """The envelopes of these names.
 
         Raises:
@@ -143,44 +162,43 @@ class Drawing:
                 raise ValueError(f"{what}: there is no envelope {name!r}; there is {there}")
         return [self.envelopes[name] for name in names]
 
-    def _vector(self, by: list[float], factor: float) -> tuple[float, float]:
+    def _length(self, pixels: float | None, otherwise: float) -> float:
+        """A length [longer side] from pixels, or else one that is given so."""
+        return otherwise if pixels is None else pixels / self.side
+
+    def _vector(self, by: Sequence[float], factor: float) -> tuple[float, float]:
         return by[0] * factor / self.side, by[1] * factor / self.side
 
-    def _mask(self, table: Mapping[str, Any]) -> Painted | None:
-        return self.paintings.mask(table["mask"]) if "mask" in table else self.weight
+    def _mask(self, force: Masked) -> Painted | None:
+        return self.weight if force.mask is None else self.images.mask(force.mask)
 
-    def _path(self, what: str, rows: list[list[float]]) -> Path:
+    def _path(self, what: str, rows: Sequence[Row]) -> Path:
         return Path([row[0] for row in rows], [self.place(what, row[1:]) for row in rows])
 
-    def _push(self, table: Mapping[str, Any]) -> GaussianForce:
-        envelope, per_length = self.envelope_and_scale("push", table)
-        vector = self._vector(table["by"], _PRESSURE * per_length)
-        return GaussianForce(
-            self.center("push", table), vector, self.radius(table), envelope, self._mask(table)
-        )
+    def _push(self, push: PushTable) -> GaussianForce:
+        envelope, per_length = self.envelope_and_scale("push", push)
+        vector = self._vector(push.by, _PRESSURE * per_length)
+        return GaussianForce(self.center("push", push), vector, self.radius(push), envelope, self._mask(push))
 
-    def _vortex(self, table: Mapping[str, Any]) -> VortexForce:
-        envelope, per_length = self.envelope_and_scale("vortex", table)
-        spin = math.radians(table["turn"]) * per_length
+    def _vortex(self, vortex: VortexTable) -> VortexForce:
+        envelope, per_length = self.envelope_and_scale("vortex", vortex)
+        spin = math.radians(vortex.turn) * per_length
         return VortexForce(
-            self.center("vortex", table), spin, self.radius(table), envelope, self._mask(table)
+            self.center("vortex", vortex), spin, self.radius(vortex), envelope, self._mask(vortex)
         )
 
-    def _grow(self, table: Mapping[str, Any]) -> Growth:
+    def _grow(self, grow: GrowTable) -> Growth:
         """Twice the logarithm of the factor is the area's; a rate, not an acceleration, takes it there."""
-        area, center = 2 * math.log(table["factor"]), self.center("grow", table)
-        if "period" in table:
-            table = {"phase": 0.25, **table}  # the cosine of the rate is the sine of the growth
-        envelope, _ = envelope_and_scale("grow", table, self.duration, self.scheme, self.loop)
-        if "period" in table:
-            period, phase = table["period"], table["phase"]
-            start, end = time_window("grow", table, self.duration)
-            wave = Oscillator(period=period, phase=phase, start=start, end=end, centred=False)
-            rate, envelope = area * 2 * math.pi / period, wave * _fade(table, start, end)
-        else:
+        area, center = 2 * math.log(grow.factor), self.center("grow", grow)
+        envelope, _ = envelope_and_scale("grow", grow, self.duration, self.scheme, self.loop)
+        if grow.period is None:
             rate = area / envelope.integral(0.0, self.duration)
-        envelope = self.modulated("grow", envelope, table)
-        return Growth(center, rate, self.radius(table), envelope, self._unfrozen(self._mask(table)))
+        else:  # the cosine of the rate is the sine of the growth
+            start, end = time_window("grow", grow, self.duration)
+            wave = Oscillator(period=grow.period, phase=grow.phase, start=start, end=end, centred=False)
+            rate, envelope = area * 2 * math.pi / grow.period, wave * _fade(grow, start, end)
+        envelope = self.modulated("grow", envelope, grow)
+        return Growth(center, rate, self.radius(grow), envelope, self._unfrozen(self._mask(grow)))
 
     def _unfrozen(self, weight: Painted | None) -> Painted | None:
         """A weight without what is frozen."""
@@ -192,75 +210,71 @@ class Drawing:
         height, width = weight.values.shape
         return Painted(weight.values * resample(free.astype(np.float32), width, height).clip(0, 1))
 
-    def _stroke(self, table: Mapping[str, Any]) -> Stroke:
-        if ("points" in table) == ("path" in table):
+    def _stroke(self, stroke: StrokeTable) -> Stroke:
+        if (stroke.points is None) == (stroke.path is None):
             raise ValueError("stroke: expected either points or path")
-        if "path" in table:
-            if table.keys() & {"start", "end"}:
+        if stroke.points is None:
+            if stroke.gives("start", "end"):
                 raise ValueError("stroke: a path has its own times; it goes without start and end")
-            path = self._path("stroke", table["path"])
+            path = self._path("stroke", stroke.path)
             if path.times[0] >= self.duration:
                 raise ValueError(f"stroke: its path begins at {path.times[0]:g} s, after the animation")
         else:
-            points = [self.place("stroke", at) for at in table["points"]]
-            path = Path.along(points, *time_window("stroke", table, self.duration))
-        envelope = self.modulated("stroke", Constant(), {**table, "strength": 1.0})
-        return Stroke(path, self.radius(table), table.get("strength", 1.0), envelope, self._mask(table))
+            points = [self.place("stroke", at) for at in stroke.points]
+            path = Path.along(points, *time_window("stroke", stroke, self.duration))
+        envelope = product(1.0, Constant(), *self.named("stroke", stroke.envelope))
+        return Stroke(path, self.radius(stroke), stroke.strength, envelope, self._mask(stroke))
 
-    def _wind(self, table: Mapping[str, Any]) -> Wind:
-        envelope, per_length = self.envelope_and_scale("wind", table)
-        return Wind(self._vector(table["by"], per_length), envelope, self._mask(table))
+    def _wind(self, wind: WindTable) -> Wind:
+        envelope, per_length = self.envelope_and_scale("wind", wind)
+        return Wind(self._vector(wind.by, per_length), envelope, self._mask(wind))
 
-    def _noise(self, table: Mapping[str, Any]) -> NoiseForce:
-        envelope, per_length = self.envelope_and_scale("noise", table)
+    def _noise(self, noise: NoiseTable, seed: int) -> NoiseForce:
+        envelope, per_length = self.envelope_and_scale("noise", noise)
         return NoiseForce(
-            strength=table["amount"] / self.side * per_length,
-            scale=table["scale"] / self.side if "scale" in table else DEFAULT_SCALE,
-            seed=table.get("seed", 0),
-            period=table.get("change"),
+            strength=noise.amount / self.side * per_length,
+            scale=self._length(noise.scale, NOISE_SCALE),
+            seed=seed if noise.seed is None else noise.seed,
+            period=noise.change,
             envelope=envelope,
-            weight=self._mask(table),
+            weight=self._mask(noise),
         )
 
-    def _image(self, table: Mapping[str, Any]) -> ImageForce:
-        name, kind, paintings = table["file"], table.get("along", "gradient"), self.paintings
-        weight = self._mask(table)
-        envelope, per_length = self.envelope_and_scale(f"force image {name}", table)
-        length = table["amount"] / self.side if "amount" in table else DEFAULT_LENGTH
-        radius = table["radius"] / self.side if "radius" in table else DEFAULT_BLUR
-        read = paintings.read if kind == "vectors" else paintings.paint
-        force = named(
-            name,
-            lambda: ImageForce(read(name), kind, length * per_length, envelope, weight, radius),
-        )
-        if kind == "gradient" and weight is None:
-            paintings.note(
-                f"{name}: the pressure balances a gradient wholly, so alone it moves nothing; "
+    def _image(self, image: ImageTable) -> ImageForce:
+        weight = self._mask(image)
+        envelope, per_length = self.envelope_and_scale(f"force image {image.file}", image)
+        strength = self._length(image.amount, IMAGE_LENGTH) * per_length
+        radius = self._length(image.radius, IMAGE_BLUR)
+        read = self.images.read if image.along == "vectors" else self.images.paint
+        with blame(file=image.file):
+            force = ImageForce(read(image.file), image.along, strength, envelope, weight, radius)
+        if image.along == "gradient" and weight is None:
+            self.images.note(
+                f"{image.file}: the pressure balances a gradient wholly, so alone it moves nothing; "
                 "use along=contour, or give it a mask"
             )
         return force
 
-    def _buoyancy(self, table: Mapping[str, Any]) -> Buoyancy:
-        envelope, per_length = self.envelope_and_scale("buoyancy", table)
-        return Buoyancy(table["density"], self._vector(table["by"], per_length), envelope)
+    def _buoyancy(self, buoyancy: BuoyancyTable) -> Buoyancy:
+        envelope, per_length = self.envelope_and_scale("buoyancy", buoyancy)
+        return Buoyancy(buoyancy.density, self._vector(buoyancy.by, per_length), envelope)
 
-    def envelope(self, what: str, table: Mapping[str, Any]) -> Envelope:
-        """The envelope that a table of `scene_format.ENVELOPES` says.
+    def envelope(self, table: EnvelopeTable) -> Envelope:
+        """The envelope that a scene's table says.
 
         Raises:
             ValueError: values that contradict.
         """
-        kind = table["kind"]
-        if kind == "samples":
-            return Arbitrary(times=table["times"], values=table["values"])
-        start, end = table.get("start", 0.0), table.get("end", math.inf)
-        if kind == "constant":
+        if isinstance(table, SamplesTable):
+            return Arbitrary(times=table.times, values=table.values)
+        start, end = table.start, math.inf if table.end is None else table.end
+        if isinstance(table, ConstantTable):
             return Constant(start, end)
-        if kind == "fade":
-            return _fade(table, start, table.get("end", self.duration))
-        phase = table.get("phase", 0.5 if self.loop == "oscillate" else 0.25)
-        return Oscillator(period=table["period"], phase=phase, start=start, end=end, centred=False)
+        if isinstance(table, OscillatorTable):
+            phase = phase_of(table, self.loop)
+            return Oscillator(period=table.period, phase=phase, start=start, end=end, centred=False)
+        return _fade(table, start, self.duration if table.end is None else table.end)
 
 
-def _fade(table: Mapping[str, Any], start: float, end: float) -> Fade:
-    return Fade(table.get("rise", 0.0), table.get("fall", 0.0), start, end)
+def _fade(ramps: Ramps, start: float, end: float) -> Fade:
+    return Fade(ramps.rise, ramps.fall, start, end)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from wfluid.animation.animation import Animation
+from wfluid.domain.limits import RADIUS
 from wfluid.model.force import flatten
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture, resample
+from wfluid.scene.forces import ForceTable, GrowTable, PushTable, Spot, StrokeTable, VortexTable, WindTable
 from wfluid.scene.scene import Scene
 from wfluid.staging.aims import Aims
-from wfluid.staging.drawing import DEFAULT_RADIUS
 
 COLOURS = ((1.0, 0.75, 0.0), (0.0, 0.8, 1.0), (1.0, 0.2, 0.6), (0.4, 1.0, 0.2))
 """One a force, in turn; linear light."""
@@ -40,12 +40,12 @@ def draw_controls(scene: Scene, animation: Animation, aims: Aims | None = None) 
     weights = {id(force.weight): force.weight for force in flatten(animation.forces) if force.weight}
     colours = _tinted(picture, fluid.viscosity, fluid.freeze, list(weights.values()))
     canvas = _Canvas(colours)
-    frame_width, frame_height = scene.tables["picture"].get("size", (picture.width, picture.height))
+    frame_width, frame_height = scene.picture.size or (picture.width, picture.height)
     side = max(frame_width, frame_height)
     stretch = picture.width / frame_width, picture.height / frame_height
-    shapes = [_force(table, side) for table in scene.tables.get("force", [])]
-    for density in scene.tables.get("density", []):
-        shapes += [_spot(source, side) for source in density.get("source", []) if "image" not in source]
+    shapes = [_force(force, side) for force in scene.forces]
+    for density in scene.densities:
+        shapes += [_spot(source, side) for source in density.sources if source.image is None]
     for number, lines in enumerate(shapes):
         for line in lines:
             canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
@@ -54,56 +54,62 @@ def draw_controls(scene: Scene, animation: Animation, aims: Aims | None = None) 
         for line in _arrow(start, tip, side):
             canvas.draw([(x * stretch[0], y * stretch[1]) for x, y in line], COLOURS[number % len(COLOURS)])
     pins = [(x * side, y * side) for x, y in aims.pins] if aims else []
-    for x, y in [*scene.tables.get("tracks", {}).get("points", []), *pins]:
+    for x, y in [*scene.tracks.points, *pins]:
         arm = 0.01 * side
         for line in ([(x - arm, y), (x + arm, y)], [(x, y - arm), (x, y + arm)]):
             canvas.draw([(a * stretch[0], b * stretch[1]) for a, b in line], (1.0, 1.0, 1.0))
     return Picture(canvas.pixels(), None, "uint8", None)
 
 
-def _force(table: Mapping[str, Any], side: float) -> Iterator[Line]:
+def _force(force: ForceTable, side: float) -> Iterator[Line]:
     """The lines that draw a force."""
-    kind = table["kind"]
-    if kind == "stroke":
-        points = table.get("points") or [row[1:] for row in table["path"]]
+    if isinstance(force, StrokeTable):
+        points = force.points or [row[1:] for row in force.path]
         yield points
         yield from _head(points[-2], points[-1], side)
-    if kind in ("push", "vortex", "grow"):
-        yield from _spot(table, side)
-        (x, y), radius = _first(table), table.get("radius", DEFAULT_RADIUS * side)
-        if kind == "push":
-            yield from _arrow((x, y), (x + table["by"][0], y + table["by"][1]), side)
-        elif kind == "vortex":
-            turn = math.radians(table["turn"])
-            arc = [
-                (x + 0.6 * radius * math.cos(a), y + 0.6 * radius * math.sin(a))
-                for a in np.linspace(0, max(-6.0, min(6.0, turn)), 49)
-            ]
-            yield arc
-            yield from _head(arc[-2], arc[-1], side)
-        else:
-            ends = (0.5, 1.0) if table["factor"] >= 1 else (1.0, 0.5)
-            for a in np.arange(4) * math.pi / 2 + math.pi / 4:
-                c, s = radius * math.cos(a), radius * math.sin(a)
-                yield from _arrow(
-                    (x + ends[0] * c, y + ends[0] * s), (x + ends[1] * c, y + ends[1] * s), side
-                )
-    if kind == "wind":
+    elif isinstance(force, WindTable):
         at = (0.05 * side, 0.05 * side)
-        yield from _arrow(at, (at[0] + table["by"][0], at[1] + table["by"][1]), side)
+        yield from _arrow(at, (at[0] + force.by[0], at[1] + force.by[1]), side)
+    elif isinstance(force, Spot):
+        yield from _spot(force, side)
+        yield from _at_spot(force, side)
 
 
-def _spot(table: Mapping[str, Any], side: float) -> Iterator[Line]:
+def _at_spot(force: PushTable | VortexTable | GrowTable, side: float) -> Iterator[Line]:
+    """What a force does at its spot: an arrow, an arc, arrows outwards or inwards."""
+    (x, y), radius = _first(force), _radius(force, side)
+    if isinstance(force, PushTable):
+        yield from _arrow((x, y), (x + force.by[0], y + force.by[1]), side)
+    elif isinstance(force, VortexTable):
+        turn = math.radians(force.turn)
+        arc = [
+            (x + 0.6 * radius * math.cos(a), y + 0.6 * radius * math.sin(a))
+            for a in np.linspace(0, max(-6.0, min(6.0, turn)), 49)
+        ]
+        yield arc
+        yield from _head(arc[-2], arc[-1], side)
+    else:
+        ends = (0.5, 1.0) if force.factor >= 1 else (1.0, 0.5)
+        for a in np.arange(4) * math.pi / 2 + math.pi / 4:
+            c, s = radius * math.cos(a), radius * math.sin(a)
+            yield from _arrow((x + ends[0] * c, y + ends[0] * s), (x + ends[1] * c, y + ends[1] * s), side)
+
+
+def _spot(spot: Spot, side: float) -> Iterator[Line]:
     """A circle at a spot's radius, and the way it takes."""
-    (x, y), radius = _first(table), table.get("radius", DEFAULT_RADIUS * side)
+    (x, y), radius = _first(spot), _radius(spot, side)
     turn = np.linspace(0, 2 * math.pi, 73)
     yield list(zip(x + radius * np.cos(turn), y + radius * np.sin(turn), strict=True))
-    if "path" in table:
-        yield [(row[1], row[2]) for row in table["path"]]
+    if spot.path is not None:
+        yield [(row[1], row[2]) for row in spot.path]
 
 
-def _first(table: Mapping[str, Any]) -> tuple[float, float]:
-    x, y = table["center"] if "center" in table else table["path"][0][1:]
+def _radius(spot: Spot, side: float) -> float:
+    return RADIUS * side if spot.radius is None else spot.radius
+
+
+def _first(spot: Spot) -> tuple[float, float]:
+    x, y = spot.path[0][1:] if spot.center is None else spot.center
     return x, y
 
 

@@ -1,0 +1,92 @@
+"""What is refused of a run before anything is computed or written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from wfluid.files.names import check_folder, files_written
+from wfluid.keyframes.plot import check_plot
+from wfluid.pictures.formats import PictureError
+from wfluid.scene.scene import Scene
+from wfluid.scene.schema import SchemaError
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a scene is run."""
+
+    device: str | None = None
+    """"cpu" (default), "cuda", …"""
+    quiet: bool = False
+    """No progress and no notes on stderr."""
+    dry_run: bool = False
+    """Say what would be computed and written, and stop."""
+    preview: str | None = None
+    """Draw the controls on the picture to this file, and stop."""
+    save_scene: str | None = None
+    """Write the scene to this file, and go on if there is an output."""
+    plot: str | None = None
+    """Draw what keyframes came to, to this file."""
+
+
+def check_run(scene: Scene, options: RunOptions) -> None:
+    """Refuse a run without motion or output, and files that cannot be written.
+
+    Raises:
+        ValueError: what is missing.
+        FileError: a name that cannot be written.
+        SceneError: an output that no format has.
+    """
+    if not (scene.forces or scene.densities or scene.keyframes):
+        raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
+    if options.plot:
+        if not scene.keyframes:
+            raise ValueError("--plot draws keyframes: the scene has none")
+        check_plot(options.plot)
+    asked = options.preview or options.save_scene or options.plot or options.dry_run
+    if not (scene.outputs or asked):
+        raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
+    for n, output in enumerate(scene.outputs):
+        try:
+            _ = output.encoding
+        except PictureError as error:
+            raise scene.error(SchemaError(("output", n), str(error))) from error
+    _check_names(scene, options)
+    _check_endings(scene, options)
+
+
+def _check_names(scene: Scene, options: RunOptions) -> None:
+    """Refuse to write over what is read, or one file twice."""
+    frames = scene.frame_count
+    taken = {path.resolve(): "a picture that is read" for path in scene.files()}
+    taken[(scene.folder / scene.picture.file).resolve()] = "the picture itself"
+    taken[Path(scene.source).resolve()] = "the scene itself"
+    written = [
+        (scene.folder / output.file, f"written as the {output.of}", output.start) for output in scene.outputs
+    ]
+    written += [
+        (Path(name), f"written by {flag}", 0)
+        for flag, name in (
+            ("--preview", options.preview),
+            ("--save-scene", options.save_scene),
+            ("--plot", options.plot),
+        )
+        if name is not None
+    ]
+    for path, what, start in written:
+        check_folder(path)
+        for name in files_written(path, start, frames):
+            if name in taken:
+                raise ValueError(f"{name}: that is {taken[name]}; write to another name")
+            taken[name] = what
+
+
+def _check_endings(scene: Scene, options: RunOptions) -> None:
+    """Refuse a report that is no JSON, a scene that is no TOML."""
+    reports = [scene.folder / output.file for output in scene.outputs if output.of == "report"]
+    scenes = [Path(options.save_scene)] if options.save_scene else []
+    for paths, ending, what in ((reports, ".json", "a report"), (scenes, ".toml", "a scene")):
+        for path in paths:
+            if path.suffix.lower() != ending:
+                raise ValueError(f"{path}: {what} is written as {ending}")

@@ -1,0 +1,71 @@
+"""Names within a scene: of groups, envelopes, densities, layers; and what a morph goes without."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from wfluid.scene.forces import BuoyancyTable
+from wfluid.scene.format import SCENE, SceneTables
+from wfluid.scene.schema import SchemaError, Table, parts
+from wfluid.scene.types import nearest
+
+SHOWN = ("picture", "tracks", "report")
+"""What an output may be of, beside layers and densities."""
+
+
+def check_names(scene: SceneTables) -> None:
+    """Refuse names that nothing has, and what does not go together.
+
+    Raises:
+        SchemaError: with the key.
+    """
+    if scene.picture is None:
+        raise SchemaError((), "[picture] is missing: what is animated")
+    groups, layers, densities = (
+        [one.name for one in tables] for tables in (scene.groups, scene.layers, scene.densities)
+    )
+    for n, force in enumerate(scene.forces):
+        _check_known(("force", n, "group"), force.group, groups)
+        if isinstance(force, BuoyancyTable):
+            _check_known(("force", n, "density"), force.density, densities)
+    for path, names in _uses_of_envelopes(scene):
+        for name in names:
+            _check_known(path, name, list(scene.envelopes))
+    for n, name in enumerate([*layers, *densities]):
+        kind, index = ("layer", n) if n < len(layers) else ("density", n - len(layers))
+        if name in SHOWN or name in [*layers, *densities][:n]:
+            raise SchemaError((kind, index, "name"), f"{name!r} is taken: outputs could not tell them apart")
+    for n, output in enumerate(scene.outputs):
+        _check_known(("output", n, "of"), output.of, [*SHOWN, *layers, *densities])
+        if output.of == "tracks" and not scene.tracks.points:
+            raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
+
+
+def check_morph(tables: dict) -> None:
+    """Refuse what a morph has no use for.
+
+    Raises:
+        SchemaError: with the key.
+    """
+    keyframes = tables.get("keyframes", {})
+    if not (keyframes.get("move") or "points" in keyframes):
+        raise SchemaError(("keyframes",), "a morph needs points of both pictures: give move or points")
+    for path, what, value in parts(SCENE, tables):
+        for name, reason in what.not_in_morph.items() if isinstance(what, Table) else ():
+            if value.get(name):
+                raise SchemaError((*path, name), reason)
+
+
+def _check_known(path: tuple, name: str | None, known: Sequence[str]) -> None:
+    if name is not None and name not in known:
+        there = f"there is {', '.join(known)}" if known else "there is none"
+        raise SchemaError(path, f"{name!r}: no such {path[-1]}; {there}{nearest(name, known)}")
+
+
+def _uses_of_envelopes(scene: SceneTables) -> Iterator[tuple[tuple, Sequence[str]]]:
+    for kind, tables in (("force", scene.forces), ("group", scene.groups)):
+        for n, one in enumerate(tables):
+            yield (kind, n, "envelope"), one.envelope
+    for n, density in enumerate(scene.densities):
+        for m, source in enumerate(density.sources):
+            yield ("density", n, "source", m, "envelope"), source.envelope
