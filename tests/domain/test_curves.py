@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from wfluid.domain.curves import DELAY_LIMIT, Curve, curve_of, delayed_part
+from wfluid.domain.curves import Curve, curve_of, delayed_part
+from wfluid.domain.limits import DELAY_LIMIT
 from wfluid.domain.piecewise import ease, hats, lerp_at
 
 PARTS = np.linspace(0, 1, 41)
