@@ -21,7 +21,8 @@ import numpy as np
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.checks import check_word
-from wfluid.domain.envelopes import Envelope, Instantaneous, Oscillator, Product, product
+from wfluid.domain.envelopes import Envelope, Instantaneous, Product, product
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.piecewise import ease
 from wfluid.domain.timeline import LOOPS
 from wfluid.model.force import Force

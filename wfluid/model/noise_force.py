@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wfluid.domain.envelopes import Constant, Envelope, Oscillator, product
+from wfluid.domain.envelopes import Constant, Envelope, product
 from wfluid.domain.grid import Grid
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.piecewise import ease, finite
 from wfluid.domain.walls import Walls
 from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
