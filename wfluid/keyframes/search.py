@@ -34,7 +34,8 @@ from wfluid.keyframes.ways import Way
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import GaussianForce
-from wfluid.optimize.lbfgs import Iterate, Settings, minimise
+from wfluid.optimize.lbfgs import Iterate, minimise
+from wfluid.optimize.settings import Settings
 
 MARCH, COARSE, FINE = "march", "coarse", "fine"
 """Stages of a search."""
