@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from wfluid.scene.checking import parts
 from wfluid.scene.forces import BuoyancyTable
 from wfluid.scene.format import SCENE, SceneTables
-from wfluid.scene.schema import SchemaError, Table, parts
+from wfluid.scene.schema import SchemaError, Table
 from wfluid.scene.types import nearest
 
 SHOWN = ("picture", "tracks", "report")

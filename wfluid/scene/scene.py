@@ -13,23 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from wfluid.domain.timeline import Timeline
-from wfluid.scene.format import SCENE, SELF, SceneTables
+from wfluid.scene.checking import attributes_of, checked, parts, replaced
+from wfluid.scene.format import DURATION, SCENE, SELF, SceneTables
 from wfluid.scene.names import check_morph, check_names
 from wfluid.scene.overrides import copied, parse_value, set_value
-from wfluid.scene.schema import (
-    Key,
-    SceneError,
-    SchemaError,
-    attributes_of,
-    blame,
-    checked,
-    dotted,
-    parts,
-    replaced,
-)
-
-DURATION = 2.0
-"""Length of a scene that names none, and whose keyframes name no time [s]."""
+from wfluid.scene.schema import Key, SceneError, SchemaError, blame, dotted
 
 
 class Scene(SceneTables):
