@@ -25,7 +25,8 @@ def checked(what: Part, value: Any, path: tuple = ()) -> Any:
         if not isinstance(value, list):
             raise SchemaError(path, f"expected a list of tables, [[{dotted(path)}]]")
         found = [checked(what.each, item, (*path, n)) for n, item in enumerate(value)]
-        _refuse_twins(what.unique, found, path)
+        if what.unique:
+            _refuse_twins(what.unique, found, path)
         return found
     if not isinstance(value, Mapping):
         raise SchemaError(path, f"expected a table, [{dotted(path)}]")
@@ -61,10 +62,10 @@ def _checked_keys(what: Table, value: Mapping, path: tuple) -> dict:
     return {str(name): checked(what.keys[name], item, (*path, str(name))) for name, item in value.items()}
 
 
-def _refuse_twins(name: str | None, found: Sequence[Mapping], path: tuple) -> None:
+def _refuse_twins(name: str, found: Sequence[Mapping], path: tuple) -> None:
     seen: dict[Any, int] = {}
     for n, item in enumerate(found):
-        value = item.get(name) if name else None
+        value = item.get(name)
         if value is None:
             continue
         if value in seen:

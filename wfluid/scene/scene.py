@@ -142,7 +142,8 @@ class Scene(SceneTables):
             SceneError: a length or a rate that makes no sense.
         """
         time, keyframes = self.time, self.keyframes
-        named = [one.time for one in (keyframes, *keyframes.moves) if one.time] if keyframes else []
+        times = [keyframes.time, *(move.time for move in keyframes.moves)] if keyframes else []
+        named = [at for at in times if at is not None]
         # no frame falls short of the last keyframe
         until = math.ceil(max(named) * time.fps - 1e-6) / time.fps if named else DURATION
         duration = until if time.duration is None else time.duration

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar, dataclass_transform
 
 from wfluid.scene.types import Type, text
@@ -218,6 +217,8 @@ class SceneTable:
 
     fields: ClassVar[Mapping[str, Field]] = {}
     """By attribute, those of bases first."""
+    kind: ClassVar[str] = ""
+    """What its key `kind` says, of one of some kinds."""
     trailing: ClassVar[bool] = False
     """Whether the keys of a base are listed after those of the tables made from it."""
     given: frozenset[str]
@@ -264,11 +265,10 @@ def union(meaning: str, *classes: type[SceneTable]) -> Union:
     return Union(meaning, {one.kind: table_of(one) for one in classes})
 
 
-@cache
 def table_of(of: type[SceneTable]) -> Table:
     """What the fields of a class say."""
-    bases = [base for base in of.__mro__[1:] if vars(base).get("trailing")]
-    late = {attribute for base in bases for attribute in base.fields}
+    bases = [base for base in of.__mro__[1:] if issubclass(base, SceneTable)]
+    late = {attribute for base in bases if vars(base).get("trailing") for attribute in base.fields}
     fields = dict(sorted(of.fields.items(), key=lambda item: item[0] in late))
     names = {attribute: one.name or attribute for attribute, one in fields.items()}
     return Table(
