@@ -41,7 +41,7 @@ USUAL_TOLERANCE = 5e-4
 
 @dataclass(frozen=True)
 class SolveMethod:
-    """By what a system is solved, and how often it is applied."""
+    """A method that solves a system, and how often it is applied."""
 
     name: str
     """"multigrid", "chebyshev" or "jacobi", which are linear and symmetric; or "conjugate gradients"."""

@@ -170,7 +170,7 @@ class Projection:
         algebra.add.launch(self.layout, self.device, [self._kept_bar], [q.grad])
 
     def _find_minus_divergence(self, velocity: Vector) -> None:
-        """Of a velocity with ghosts."""
+        """`_minus_div` = -div of a velocity with ghosts."""
         inputs = [*velocity, *self._inverse_h, self.layout.pitch]
         projection.minus_divergence.launch(self.layout, self.device, inputs, [self._minus_div])
 
