@@ -271,3 +271,14 @@ def test_a_stage_on_a_tape_without_gradients_is_refused(device):
     step.plan(DT, DT, step.follow_medium)
     with pytest.raises(RuntimeError, match="missing a gradient"), recording():
         step.advance(*states, acting)
+
+
+def test_gradients_allowed_again_keep_their_arrays(device):
+    """Graphs captured before have the addresses of all that transposes work with."""
+    step = Step(GRID, Fluid(densities=[INK]), device)
+    stages = (step.feet, step.advection, step.projection, *step.densities)
+    step.allow_gradients()
+    before = [dict(vars(stage)) for stage in stages]
+    step.allow_gradients(of_viscosity=True)
+    for stage, own in zip(stages, before, strict=True):
+        assert all(vars(stage)[name] is value for name, value in own.items())

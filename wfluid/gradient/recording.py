@@ -98,6 +98,7 @@ class Recording:
         grid, device = step.grid, step.device
         self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
         load_kernels(device)
+        self._of_viscosity = of_viscosity
         step.allow_gradients(of_viscosity)
         self._before, self._after, self._bar, self._after_bar = (
             State.at_rest(grid, device, len(step.densities), len(stretch.points))
@@ -217,6 +218,7 @@ class Recording:
             plan = self.step.plan(self.time_of(1), dt, self._prepare)
         if plan != self._plan:
             self._plan = ()  # should the captures be interrupted
+            self.step.allow_gradients(self._of_viscosity)
             forward = CapturedGraph(self.device, self._record, self._pool)
             backward = CapturedGraph(self.device, self._play_back, self._pool)
             self._forward, self._backward, self._plan = forward, backward, plan

@@ -129,17 +129,19 @@ class Step:
             self.push(state, forcing)
 
     def allow_gradients(self, of_viscosity: bool = False) -> None:
-        """Allocate what the transposes need, and load their kernels.
+        """Allocate what the transposes need, unless it is there, and load their kernels.
 
         With `of_viscosity` the gradient with respect to viscosity is found as well, which is right only as
         far as the diffusion is solved. A viscosity that moves needs it in any case.
         """
         load_kernels(self.device, ADJOINT)
         self._of_viscosity = of_viscosity or self.fluid.viscosity_moves
+        self.diffusion.allow_gradients(self._of_viscosity)
+        if self.pushed[0].grad is not None:
+            return  # captured graphs know the arrays by their addresses
         attach_gradients(self.pushed, self.layout)
         if self.medium:
             self.medium.allow_gradients()
-        self.diffusion.allow_gradients(self._of_viscosity)
         for stage in (self.feet, self.advection, self.projection, *self.densities):
             stage.allow_gradients()
 
