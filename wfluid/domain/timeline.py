@@ -9,6 +9,9 @@ from dataclasses import dataclass
 STEPS_PER_SECOND = 96
 """Default number of steps per second: a step of 1/96 s keeps the splitting error small."""
 
+KEYFRAME_STEPS = 48
+"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
+
 FPS = 24.0
 """Default frame rate of `Timeline` and `animate` [1/s]: that of cinema."""
 

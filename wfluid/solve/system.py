@@ -41,9 +41,9 @@ USUAL_TOLERANCE = 5e-4
 
 @dataclass(frozen=True)
 class SolveMethod:
-    """How a system is solved: a method and how often it is applied."""
+    """A method that solves a system, and how often it is applied."""
 
-    method: str
+    name: str
     """"multigrid", "chebyshev" or "jacobi", which are linear and symmetric; or "conjugate gradients"."""
     iterations: int
     """Cycles or sweeps, from zero; of conjugate gradients the most."""
@@ -97,7 +97,7 @@ class LinearSystem:
         self.transfers = [Transfer(fine, coarse, device) for fine, coarse in pairwise(self.levels)]
         top, coarsest = self.levels[0], self.levels[-1].layout
         components = len(top.points)
-        self.zero, self.left, self.correction, self.spare = (
+        self.zero, self.residual, self.correction, self.spare = (
             vector(top.layout, device, components) for _ in range(4)
         )
         self.unknowns = coarsest.nx * coarsest.ny * components
@@ -149,31 +149,31 @@ class LinearSystem:
         """The fewest cycles that leave at most `tolerance` of any b."""
         return SolveMethod("multigrid", chebyshev_count(*self.interval, tolerance))
 
-    def prepare(self, how: SolveMethod) -> None:
+    def prepare(self, method: SolveMethod) -> None:
         """Make ready, before a graph is captured, what a solve keeps on the device."""
-        cycles = how.iterations
-        if how.method == "multigrid" and cycles not in self._factors:
+        cycles = method.iterations
+        if method.name == "multigrid" and cycles not in self._factors:
             factors = chebyshev_factors(*self.interval, cycles) if cycles > 1 else np.ones(1)
             self._factors[cycles] = entries(upload(factors, self.device))
-        if how.method == "conjugate gradients" and self._conjugate is None:
+        if method.name == "conjugate gradients" and self._conjugate is None:
             self._conjugate = ConjugateGradients(self.levels[0], self.zero, self.cycle, self.device)
 
-    def solve(self, how: SolveMethod, b: Vector, x: Vector, whole: Vector | None = None) -> None:
-        """x = what `how` makes of b. Fills the ghosts of b and x.
+    def solve(self, method: SolveMethod, b: Vector, x: Vector, whole: Vector | None = None) -> None:
+        """x = what the method makes of b. Fills the ghosts of b and x.
 
         Conjugate gradients stop when what x misses is `tolerance` of x, and of `whole` where given.
         """
-        self.prepare(how)
+        self.prepare(method)
         self.levels[0].fill(b)
-        if how.method == "multigrid":
-            self._cycles(b, x, how.iterations)
-        elif how.method == "conjugate gradients":
-            self._conjugate.solve(b, x, how.tolerance, how.iterations, whole)
-        elif how.method == "chebyshev":
-            rates = entries(self._rates, slice(how.iterations))
+        if method.name == "multigrid":
+            self._cycles(b, x, method.iterations)
+        elif method.name == "conjugate gradients":
+            self._conjugate.solve(b, x, method.tolerance, method.iterations, whole)
+        elif method.name == "chebyshev":
+            rates = entries(self._rates, slice(method.iterations))
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
         else:
-            rates = [self.levels[0].plain] * how.iterations
+            rates = [self.levels[0].plain] * method.iterations
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
 
     def _cycles(self, b: Vector, x: Vector, cycles: int) -> None:
@@ -182,13 +182,13 @@ class LinearSystem:
         factors = self._factors[cycles]
         at, other = (x, self.spare) if cycles % 2 else (self.spare, x)
         for cycle in range(cycles):
-            left = b
+            residual = b
             if cycle:
                 at, other = other, at
-                top.residual(b, other, self.left)
-                top.fill(self.left)
-                left = self.left
-            self.cycle(left, self.correction)
+                top.residual(b, other, self.residual)
+                top.fill(self.residual)
+                residual = self.residual
+            self.cycle(residual, self.correction)
             start, factor = other if cycle else self.zero, factors[cycle]
             with together():
                 for f, e, out in zip(start, self.correction, at, strict=True):
@@ -220,12 +220,12 @@ class LinearSystem:
             dense.multiply.launch(cells, self.device, inputs, [f])
         level.fill(out)
 
-    def measure(self, how: SolveMethod, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
+    def measure(self, method: SolveMethod, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
         """The true residual of a solve; `norm_a` is a bound of ||A||."""
         top = self.levels[0]
-        top.residual(b, x, self.left)
-        top.fill(self.left)
+        top.residual(b, x, self.residual)
+        top.fill(self.residual)
         top.fill(b)
-        ran = self._conjugate.ran() if how.method == "conjugate gradients" else how.iterations
-        left, right, answer = (self.inner.norm(f) for f in (self.left, b, x))
-        return Residual(how.method, ran, left, right, norm_a * answer)
+        ran = self._conjugate.ran() if method.name == "conjugate gradients" else method.iterations
+        residual, right, answer = (self.inner.norm(f) for f in (self.residual, b, x))
+        return Residual(method.name, ran, residual, right, norm_a * answer)
