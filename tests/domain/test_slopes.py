@@ -1,4 +1,4 @@
-"""First derivatives of what forces do over a step: equal to differences, for every number that may vary."""
+"""Derivatives of the effect of forces over a step equal differences, for every parameter that may vary."""
 
 import math
 import re
@@ -24,7 +24,7 @@ from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Buoyancy, Wind
 
 STEP = 3e-4
-"""Of the differences: their error, STEP^4 / 30 times a fifth derivative (below 3e7), is below 9e-9; the
+"""Tolerance of differences: their error, STEP^4 / 30 times a fifth derivative (below 3e7), is below 9e-9; the
 rounding of a value below 10, 1.5 eps value / STEP, is below 2e-11."""
 
 TOLERANCE = 1e-8
@@ -39,16 +39,16 @@ STEPS = {
     "before": (-1.0, -0.4),
     "after": (2.2, 2.9),
 }
-"""What a step contains of a centred oscillator from 0.3 to 1.7 s with a period of 0.65 … 0.95 s."""
+"""Steps with different parts of a centred oscillator from 0.3 to 1.7 s with a period of 0.65 … 0.95 s."""
 
 
 def inner(thing, name):
-    """The attribute, or the entry of a tuple, of a name."""
+    """The attribute, or the entry of a tuple, with a name."""
     return thing[int(name)] if name.isdigit() else getattr(thing, name)
 
 
 def changed(thing, names, index, by):
-    """The same with the number that the names lead to, or its entry, changed."""
+    """A copy in which the parameter at a path of names, or one of its entries, is changed."""
     if not names:
         values = np.array(thing, dtype=np.float64)
         values[index] += by
@@ -60,7 +60,7 @@ def changed(thing, names, index, by):
 
 
 def differences(function, thing, path):
-    """Of fourth order: the derivative of function(thing) with respect to each number at a path."""
+    """The derivative of function(thing) by each parameter at a path, by differences of fourth order."""
     names = re.findall(r"\w+", path)
     out = np.zeros(np.shape(reduce(inner, names, thing)))
     for index in np.ndindex(out.shape):
@@ -73,7 +73,7 @@ def differences(function, thing, path):
 
 
 def assert_slopes(got, names, function, thing):
-    """The names are all there, and each has its number's shape and derivative."""
+    """All names are present, each with its parameter's shape and derivative."""
     assert set(got) == set(names)
     for name, slope in got.items():
         expected = differences(function, thing, name)
@@ -99,7 +99,7 @@ def samples(random):
 
 
 def faded():
-    """A break 0.1 s after the oscillator begins: no piece of the time is a whole number of quarters."""
+    """A break 0.1 s after the start of the oscillator: no piece is a multiple of a quarter period."""
     return Fade(rise=0.2, fall=0.5, start=0.2, end=1.8)
 
 
@@ -164,7 +164,7 @@ def test_value_slopes_of_an_envelope_are_those_of_its_value(name):
 @given(st.lists(st.floats(0, 2), max_size=4))
 @pytest.mark.parametrize("name", ENVELOPES)
 def test_slopes_of_steps_add_up(name, cuts):
-    """However the time is cut into steps, also where the value jumps: each jump moves in one step."""
+    """For any steps, also with jumps of the value: each jump counts in one step."""
     envelope = ENVELOPES[name][0](np.random.default_rng(0))
     jumps = [t for t, _, _ in envelope.jumps(0.0, 2.0)]
     edges = sorted([0.0, *cuts, *jumps, 2.0])
@@ -174,13 +174,13 @@ def test_slopes_of_steps_add_up(name, cuts):
         np.testing.assert_allclose(parts, slope, atol=TOLERANCE, err_msg=key)
 
 
-def test_a_function_is_not_asked_outside_the_window_it_is_multiplied_by():
+def test_a_function_is_not_called_outside_the_window_that_multiplies_it():
     arch = Constant(1.0, 2.0) * Arbitrary(lambda t: math.sqrt((t - 1) * (2 - t))) * Oscillator(centred=False)
     assert not any(arch.slopes(2.5, 3.0).values())
     assert all(arch.slopes(0.5, 2.5).values())
 
 
-def test_an_envelope_of_ones_own_has_no_slopes():
+def test_an_envelope_of_a_user_has_no_slopes():
     class Ramp(Envelope):
         def value(self, t):
             return t
@@ -223,8 +223,8 @@ BLOBS = {
 @pytest.mark.parametrize("course", COURSES)
 @pytest.mark.parametrize("center", CENTERS)
 @pytest.mark.parametrize("kind", BLOBS)
-def test_a_gaussian_pulls_back_through_its_blob(kind, center, course, step):
-    """With random weights of all numbers of the blob, the gradient of their sum."""
+def test_a_gaussian_pulls_back_through_its_impulse(kind, center, course, step):
+    """With random weights of all entries of the impulse, the gradient of their sum."""
     random = np.random.default_rng([len(kind), len(center), len(step)])
     (make, name), (place, center_names), (envelope, names) = BLOBS[kind], CENTERS[center], COURSES[course]
     number = random.uniform(-2, 2, 2) if name == "vector" else random.uniform(-2, 2)
@@ -254,7 +254,7 @@ def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(course, step):
 
 
 def buoyant(force, start, end):
-    """What each component of the vector times the density adds."""
+    """The contribution of each component of the vector times the density."""
     return np.multiply(force.vector, force.envelope.integral(start, end))
 
 

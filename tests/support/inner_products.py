@@ -1,4 +1,4 @@
-"""Inner products of fields, and what the tests of transposes share: <y, A x> = <A^T y, x>."""
+"""Inner products of fields for the tests of transposes: <y, A x> = <A^T y, x>."""
 
 import numpy as np
 from wfluid.kernels.cell.layout import HALO
@@ -23,7 +23,7 @@ def put_padded(values, f, layout):
 
 
 def noise(layout, device, components, seed, *ghosts):
-    """Fields of noise; with `ghosts` for each, these filled and what lies on a wall 0."""
+    """Fields of noise; with `ghosts` for each field, ghosts are filled and values on walls are 0."""
     rng = np.random.default_rng(seed)
     fields = vector(layout, device, components)
     for f in fields:
