@@ -180,8 +180,8 @@ class Case:
 def cells_of_traces(functional):
     """The cells used by the bilinear look-ups of the last run, step by step.
 
-    Computed from velocities and displacements, independently of the code under test: for every centre and face
-    the cell of the end of its backtrace (the paper's scheme) or of the backtrace's middle, and whether a wall
+    Computed from velocities and displacements, independently of the code under test. For every centre and
+    face it is the cell at the end of the backtrace (the paper's scheme) or at its middle, and whether a wall
     stopped the backtrace; with a moving viscosity also the source. The recording must keep every state.
     """
     recording = functional._recording
