@@ -5,11 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-LEAST_CELLS = 4
-"""Cells along an axis below which a cubic stencil no longer fits."""
-
-CELLS, CELLS_LIMIT = 256, 8192
-"""Cells along the longer side where nothing says it, and the most there may be: indices are 32-bit."""
+from wfluid.domain.limits import CELLS, LEAST_CELLS
 
 
 @dataclass(frozen=True)

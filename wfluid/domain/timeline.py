@@ -6,26 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-STEPS_PER_SECOND = 96
-"""Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
-
-KEYFRAME_STEPS = 48
-"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
-
-FPS = 24.0
-"""Frames a second of a `Timeline`, and of `animate`, that name none: the cinema's."""
-
-SCENE_FPS = 15.0
-"""The same of scenes and command lines, which mostly write a GIF: its size grows with every frame."""
-
-LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
-"""Frame rates that make sense."""
+from wfluid.domain.limits import FPS, FPS_LIMIT, LEAST_FPS, STEPS_PER_SECOND
 
 FRAME_LIMIT = 100_000
 """Most frames of one animation."""
-
-SUBSTEPS_LIMIT = 100_000
-"""Most steps a frame that a scene may ask for."""
 
 MOST_FACTOR = 8
 """Times the least steps that may be taken so that a time falls on one."""
@@ -104,5 +88,3 @@ class Timeline:
 
 STEP_LIMIT = 10.0
 """Longest step the solver is tested with [s]."""
-
-LOOPS = ("oscillate", "pingpong", "crossfade")

@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from wfluid.domain.limits import WALLS
+
 
 class Wall(Enum):
     """What the two edges of an axis do to the fluid."""
 
-    FREE_SLIP = "free-slip"
+    FREE_SLIP = WALLS[0]
     """Nothing flows through; the fluid slides along."""
-    NO_SLIP = "no-slip"
+    NO_SLIP = WALLS[1]
     """Nothing flows through and the border stays where it is."""
-    PERIODIC = "periodic"
+    PERIODIC = WALLS[2]
     """What leaves on one side comes in on the other: for tileable pictures."""
 
 
