@@ -85,6 +85,17 @@ def test_spans_equal_single_cells_bit_for_bit(device, program, inputs):
     np.testing.assert_array_equal(*results)
 
 
+def test_programs_of_one_source_have_a_kernel_each():
+    """Warp tells kernels of a module apart by name; two of one name would share what the device runs."""
+    keys = [(kernel.module.name, kernel.key) for program in programs() for kernel in program.kernels.values()]
+    assert len(keys) == len(set(keys))
+    names = {
+        program.kernels["cpu"].key
+        for program in (advection.advect_face_cubic, advection.advect_face_bilinear)
+    }
+    assert names == {f"advection_advect_face_{kind}_{SPAN}" for kind in ("cubic", "bilinear")}
+
+
 ORIGINAL_ANNOTATIONS = {
     five_point.residual: {"centre": Uniform, "ax": Uniform, "ay": Uniform},
     advection.trace_midpoint: {"dt_hx": Uniform, "dt_hy": Uniform},
