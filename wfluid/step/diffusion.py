@@ -72,7 +72,7 @@ class ScalarDiffusion:
         top = self.system.levels[0]
         top.residual((f,), (f,), self._change)
         self.system.solve(self.how, self._change, self._answer)
-        if self._conserved and self.how.method == "multigrid":
+        if self._conserved and self.how.name == "multigrid":
             self._balance(*self._answer)
         inputs = [f, *self._answer, self._numbers.one]
         algebra.add_scaled.launch(self.layout, self.device, inputs, [out])
@@ -82,7 +82,7 @@ class ScalarDiffusion:
         """The transpose of `diffuse`, without ghosts: f_bar = out_bar + (1 - A) M out_bar."""
         top, b = self.system.levels[0], self._change
         alone(lambda: copy(out_bar, *b))
-        if self._conserved and self.how.method == "multigrid":
+        if self._conserved and self.how.name == "multigrid":
             self._balance(*b)
         self.system.solve(self.how, b, self._answer)
         top.residual(self._answer, self._answer, b)
@@ -193,7 +193,7 @@ class CoupledDiffusion:
                 algebra.multiply.launch(self.layout, self.device, [f, beta], [start])
         top.fill(self._start)
         top.residual(velocity, self._start, self._change)
-        self.system.solve(self.how, self._change, self._answer, whole=velocity)
+        self.system.solve(self.how, self._change, self._answer, scale=velocity)
         with together():
             for f, change, out in zip(self._start, self._answer, self.out, strict=True):
                 algebra.add_scaled.launch(self.layout, self.device, [f, change, self._numbers.one], [out])
@@ -203,7 +203,7 @@ class CoupledDiffusion:
         """The transpose of `diffuse`, without ghosts: f_bar = beta (out_bar - A lambda) + lambda."""
         top, beta = self.system.levels[0], self.medium.levels[0].beta
         answer = self._answer
-        self.system.solve(self.how, out_bar, answer, whole=out_bar)
+        self.system.solve(self.how, out_bar, answer, scale=out_bar)
         top.residual(out_bar, answer, self._change)
         with together():
             for change, b, start in zip(self._change, beta, self._start, strict=True):

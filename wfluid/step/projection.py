@@ -134,4 +134,4 @@ class Projection:
     def measure(self) -> tuple[Residual, float]:
         """What the last projection left of the divergence not prescribed: residual, largest value [1/s]."""
         residual = self.system.measure(self.how, self._minus_div, self._q)
-        return residual, self.system.inner.largest(self.system.left[0])
+        return residual, self.system.inner.largest(self.system.residual[0])
