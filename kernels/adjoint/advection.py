@@ -123,27 +123,42 @@ foot_adjoint_bilinear = _foot_adjoint(bilinear_slopes_of)
 
 
 @adjoint_cells
-def foot_gradient(
+def add_feet_of_faces(
     i: int,
     j: int,
     k: int,
     of_u: Field,
     of_v: Field,
-    of_d_x: Field,
-    of_d_y: Field,
-    d_bar: Field,
     pitch: int,
     # outputs
     foot_bar: Field,
 ):
-    """The gradient with respect to one axis of the foot of centre k, of all that was carried from it.
+    """Add to the gradient of one axis of the foot of centre k that of the feet of the faces around it.
 
-    Faces took the mean of the two feet beside them; of the displacement the foot is also a summand.
+    Faces took the mean of the two feet beside them.
     """
     k = inside(k)
     south = inside(k + pitch)
-    faces = Real(0.5) * (of_u[k] + of_u[k + 1] + of_v[k] + of_v[south])
-    foot_bar[k] = faces + of_d_x[k] + of_d_y[k] + d_bar[k]
+    foot_bar[k] = foot_bar[k] + Real(0.5) * (of_u[k] + of_u[k + 1] + of_v[k] + of_v[south])
+
+
+@adjoint_cells
+def add_feet_of_centres(
+    i: int,
+    j: int,
+    k: int,
+    of_d_x: Field,
+    of_d_y: Field,
+    d_bar: Field,
+    # outputs
+    foot_bar: Field,
+):
+    """Add to the gradient of one axis of the foot of centre k that of the displacement carried from it.
+
+    Of the displacement along that axis the foot is also a summand.
+    """
+    k = inside(k)
+    foot_bar[k] = foot_bar[k] + of_d_x[k] + of_d_y[k] + d_bar[k]
 
 
 @adjoint_cells

@@ -47,9 +47,10 @@ from wfluid.fields.state import State
 from wfluid.gradient.checkpoints import even_segments, least_room
 from wfluid.gradient.functional import Functional
 from wfluid.gradient.objectives import Effort, ParticleMisfit
-from wfluid.gradient.recording import MEGABYTE, WORKING_STATES, record
+from wfluid.gradient.recording import MEGABYTE, WORKING_STATES
 from wfluid.gradient.state_objectives import DensityMisfit, MapMisfit
 from wfluid.gradient.variables import Free
+from wfluid.step.tape import record, recording
 
 FREE_SLIP, NO_SLIP, MOVES, DENSITIES, CHANGES = (
     CASES[name]
@@ -205,8 +206,8 @@ def test_memory_is_what_the_schedule_says(device, case, steps):
     timeline = Timeline(steps / 48, fps=48, substeps=1)
     case = loosely(case, objective=ParticleMisfit(PARTICLES.points, PARTICLES.destinations, steps / 48))
     functional = case.functional(device, timeline=timeline)
-    densities, coupled = len(case.fluid.get("densities", ())), functional._recording.stages.medium is not None
-    cells = functional._recording.stages.layout.size
+    densities, coupled = len(case.fluid.get("densities", ())), functional._recording.step.medium is not None
+    cells = functional._recording.step.layout.size
     numbers = (4 + densities + coupled) * cells + 2 * len(PARTICLES.points)
     each = numbers * np.dtype(wp.dtype_to_numpy(Real)).itemsize
 
@@ -372,10 +373,10 @@ def test_a_recording_that_steps_to_and_fro_between_two_states_is_warned_of(devic
     a, b = (State.at_rest(GRID, device, points=1) for _ in range(2))
     for state in (a, b):
         state.take_gradient(State.at_rest(GRID, device, points=1))
-    tape = wp.Tape()
-    assert not watched(lambda: record(tape, print, a, b))
-    warnings = watched(lambda: record(tape, print, b, a))
-    assert len(warnings) == len(a.arrays) and all("a step" in one for one in warnings)
+    with recording():
+        assert not watched(lambda: record(print, a.arrays, b.arrays))
+        warnings = watched(lambda: record(print, b.arrays, a.arrays))
+    assert len(warnings) == len(a.arrays) and all("a stage" in one for one in warnings)
 
 
 # Precision

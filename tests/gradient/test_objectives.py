@@ -147,5 +147,5 @@ def test_where_something_is_frozen_solves_go_to_a_tolerance_that_gradients_can_r
     freeze = Freeze((np.arange(17) > 11)[None, :] * np.ones((12, 1)))
     functional = make(MISFIT, Fluid(viscosity=0.01, freeze=freeze))
     diffusion, projection, *_ = functional._recording._plan
-    assert projection.method == "conjugate gradients" and projection.tolerance <= 1e-4
-    assert diffusion.method != "conjugate gradients" or diffusion.tolerance <= 1e-4
+    assert projection.name == "conjugate gradients" and projection.tolerance <= 1e-4
+    assert diffusion.name != "conjugate gradients" or diffusion.tolerance <= 1e-4

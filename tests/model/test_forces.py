@@ -44,7 +44,7 @@ def pushed(make_solver, forces, t=0.0, dt=0.01, grid=STRETCHED, **fluid):
     """What forces add to u and v on the first faces, in a step from rest, before all else."""
     solver = make_solver(grid.nx, grid.ny, grid=grid, **fluid)
     solver.step(solver.rest(), solver.rest(), forces, t, dt)
-    return [to_numpy(f, solver.layout) for f in solver._stages.pushed]
+    return [to_numpy(f, solver.layout) for f in solver._step.pushed]
 
 
 def assert_on_faces(got, expected, periodic, atol=2e-7):

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from scenes import KEYS, VALUES, WRONG, changed, full, keys_of, less, named, of_morph, parts, scenes, takes
 
 from wfluid.domain.limits import CURVES
+from wfluid.scene.checking import checked
 from wfluid.scene.format import SCENE
 from wfluid.scene.reference import reference, tables
 from wfluid.scene.scene import Scene
-from wfluid.scene.schema import ArrayOf, Key, MapOf, SceneError, SchemaError, Table, Union, checked
+from wfluid.scene.schema import ArrayOf, Key, MapOf, SceneError, SchemaError, Table, Union
 from wfluid.scene.toml_file import read_scene, write_scene
 
 EVERYTHING = named(less(full(), "morph"), lambda names: names[-1])

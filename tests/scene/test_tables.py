@@ -13,11 +13,13 @@ from wfluid.domain.timeline import SCENE_FPS
 from wfluid.model.fluid import Fluid
 from wfluid.model.painted import Freeze
 from wfluid.morphing.settings import MorphSettings
+from wfluid.scene.checking import checked, made
 from wfluid.scene.forces import PushTable, VortexTable
-from wfluid.scene.format import SCENE, FluidTable, FramesTable, FreezeTable, MorphTable
+from wfluid.scene.format import SCENE, FluidTable, FramesTable, FreezeTable
+from wfluid.scene.keyframes import MorphTable
 from wfluid.scene.reference import tables
 from wfluid.scene.scene import Scene
-from wfluid.scene.schema import Key, SceneTable, SchemaError, checked, key, made, table_of
+from wfluid.scene.schema import Key, SceneTable, SchemaError, key, table_of
 from wfluid.scene.types import number, whole
 
 TABLES = {

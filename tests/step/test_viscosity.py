@@ -209,7 +209,7 @@ def test_a_viscosity_that_moves_goes_with_the_picture(make_solver):
             solver.step(a, b, [], 0.0, 2 / 32)
             a, b = b, a
         solver.step(a, b, [], 0.0, 2 / 32)
-        got = to_numpy(solver._stages.medium.levels[0].mu, solver.layout)
+        got = to_numpy(solver._step.medium.levels[0].mu, solver.layout)
         expected = np.roll(mu, (-5, 10), (0, 1)) if moves else mu
         np.testing.assert_allclose(got, expected, atol=2e-5 * 0.01 + 1e-7)
 
@@ -222,7 +222,7 @@ def test_a_viscosity_of_the_time_is_followed(make_solver):
         a, b = solver.rest(), solver.rest()
         for t, expected in ((0.0, 0.02575), (0.25, 0.0505), (0.75, 0.1), (2.0, 0.1)):
             solver.step(a, b, [], t, 0.25)
-            got = to_numpy(solver._stages.medium.levels[0].mu, solver.layout)
+            got = to_numpy(solver._step.medium.levels[0].mu, solver.layout)
             np.testing.assert_allclose(got, expected, rtol=1e-6)
 
 

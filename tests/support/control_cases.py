@@ -187,7 +187,7 @@ def cells_of_traces(functional):
     """
     recording = functional._recording
     assert recording.schedule.keeps_all
-    fluid, layout, steps = functional._recording.stages.fluid, recording.stages.layout, TIMELINE.steps
+    fluid, layout, steps = functional._recording.step.fluid, recording.step.layout, TIMELINE.steps
     lines = layout.size // layout.pitch
     u, v, d_x, d_y = (
         table.rows(0, steps)[:, : lines * layout.pitch].reshape(steps, lines, layout.pitch)

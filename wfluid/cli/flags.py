@@ -1,4 +1,4 @@
-"""The flags that say a scene: those of one key come from the fields of its tables, then short forms."""
+"""The flags of the commands that make a scene; those of single keys come from the fields of its tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wfluid.cli.options import DENSITIES, flag_name, force_flag
+from wfluid.cli.options import DENSITIES, KEYFRAME_TIME, flag_name, force_flag
 from wfluid.cli.run_flags import add_plot, add_run, repeated
 from wfluid.scene.forces import FORCES
 from wfluid.scene.format import SCENE
@@ -30,7 +30,8 @@ def add_keyframes(parser: argparse.ArgumentParser) -> None:
     add("--move", **repeated("X0,Y0:X1,Y1[@T]", "the point X0,Y0 should be at X1,Y1 at T seconds [px]"))
     add("--pin", **repeated("X,Y", "this point should stay [px]"))
     add("--points", metavar="FILE.csv", help="moves in a file: from x, from y, to x, to y[, seconds]")
-    add("--time", type=float, help="when points arrive whose time is not given [s] (1, or the duration)")
+    text = f"when points arrive whose time is not given [s] ({KEYFRAME_TIME:g}, or the duration)"
+    add("--time", type=float, help=text)
     add_plot(parser)
     _add_forces(parser)
     _add_companions(parser)
@@ -69,7 +70,7 @@ def _add_keys(parser: argparse.ArgumentParser, without: Sequence[str] = (), morp
 
 
 def add_key_flags(parser: argparse.ArgumentParser, name: str, meaning: str, keys: Mapping[str, Any]) -> None:
-    """A group of flags, a key each."""
+    """Add a group of flags, one for each key that has one."""
     flags = {key.flag: key for key in keys.values() if isinstance(key, Key) and key.flag}
     if flags:
         group = parser.add_argument_group(name, meaning)
@@ -78,7 +79,7 @@ def add_key_flags(parser: argparse.ArgumentParser, name: str, meaning: str, keys
 
 
 def _add_key_flag(group: Any, flag: str, key: Key) -> None:
-    """The flag of a key; what is not given is None."""
+    """Add the flag of a key, whose value is None where it is not given."""
     unit = f" [{key.unit}]" if key.unit else ""
     words = f": {', '.join(key.kind.words)}" if key.kind.words else ""
     default = f" ({key.shown_default})" if key.shown_default and key.kind.read is not bool else ""
@@ -94,7 +95,7 @@ def _add_key_flag(group: Any, flag: str, key: Key) -> None:
 
 
 def _add_forces(parser: argparse.ArgumentParser) -> None:
-    """The short forms of what moves the picture, and its masks."""
+    """The short forms of forces and densities."""
     group = parser.add_argument_group("forces", "What moves the picture, places and lengths in pixels")
     for kind, (form, *_) in FORMS.items():
         if kind in DENSITIES:
@@ -119,7 +120,7 @@ def _add_companions(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_shot(parser: argparse.ArgumentParser) -> None:
-    """The flags that every command has which says a scene."""
+    """The flags of every command that makes a scene."""
     strength = SCENE.keys["freeze"].keys["strength"]
     text = f"a mask, white where the picture stays (drag {strength.shown_default}/s)"
     parser.add_argument("--freeze", metavar="MASK[:STRENGTH]", help=text)

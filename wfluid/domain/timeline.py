@@ -9,6 +9,9 @@ from dataclasses import dataclass
 STEPS_PER_SECOND = 96
 """Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
 
+KEYFRAME_STEPS = 48
+"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
+
 FPS = 24.0
 """Frames a second of a `Timeline`, and of `animate`, that name none: the cinema's."""
 

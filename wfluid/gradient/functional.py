@@ -141,7 +141,7 @@ class Functional:
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
         before = graphs.find(grid, timeline, fluid) if graphs else None
-        stages = before.stages if before else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
+        step = before.step if before else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[DeviceObjective]] = {}
         # graphs count effort with weight 1, and so suit all weights: the others are relative to it
@@ -154,7 +154,7 @@ class Functional:
             if isinstance(term, ParticleObjective):
                 self._particles.append((weight, term, own))
             elif isinstance(term, StateObjective):
-                terms.setdefault(steps[0], []).append(term.term(stages, weight, own))
+                terms.setdefault(steps[0], []).append(term.term(step, weight, own))
             elif not isinstance(term, Effort):
                 raise TypeError(f"{type(term).__name__} is no objective that a run has")
         points = np.concatenate([np.empty((0, 2)), *(points_of(term) for _, term in terms_of(objective))])
@@ -169,7 +169,7 @@ class Functional:
         else:
             steps = round(room / timeline.dt)
             self._recording = Recording(
-                stages, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
+                step, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
             )
         self._graphs = graphs
         if graphs:

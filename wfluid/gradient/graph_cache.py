@@ -24,11 +24,11 @@ class GraphCache:
     def find(self, grid: Grid, timeline: Timeline, fluid: Fluid) -> Recording | None:
         """The last recording with this grid and timeline, if it was made for this very fluid."""
         found = self._recordings.get((grid, timeline))
-        return found if found and found.stages.fluid is fluid else None
+        return found if found and found.step.fluid is fluid else None
 
     def keep(self, recording: Recording, user: object) -> None:
         """Store a recording as the last one, which `user` runs from now on."""
-        self._recordings[recording.stages.grid, recording.timeline] = recording
+        self._recordings[recording.step.grid, recording.timeline] = recording
         self._users[recording] = user
 
     def serves(self, recording: Recording, user: object) -> bool:

@@ -71,21 +71,21 @@ class PictureMisfit(StateObjective):
                 + (", its alpha for the transparent edge included" if gains else "")
             )
 
-    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
-        """On the device, for the grid and walls of `stages`."""
-        return _PictureTerm(self, stages, weight)
+    def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
+        """On the device, for the grid and walls of `step`."""
+        return _PictureTerm(self, step, weight)
 
 
 class _PictureTerm(DeviceObjective):
     """Half the weighted squares of the pixels shown less those wanted."""
 
-    def __init__(self, misfit: PictureMisfit, stages: Step, weight: float):
-        width, height, grid = misfit.target.width, misfit.target.height, stages.grid
-        self.device, self.layout = stages.device, Layout(width, height)
+    def __init__(self, misfit: PictureMisfit, step: Step, weight: float):
+        width, height, grid = misfit.target.width, misfit.target.height, step.grid
+        self.device, self.layout = step.device, Layout(width, height)
         self._look_up = LookUp(
             misfit.picture.shrunk(width, height),
             grid,
-            stages.fluid.walls,
+            step.fluid.walls,
             self.device,
             width=width,
             height=height,

@@ -1,12 +1,13 @@
 """A run that can be gone back through.
 
-A step is recorded on a `wp.Tape` as one entry (`adjoint.StepAdjoint`) and captured in two graphs: a loop of
-steps forward, and a loop of the tape played back. Both find in device memory which step they are at
-(`kernels/adjoint/step_table.py`): the state it begins with, the numbers of what acts, where to leave what
-they find. So they are captured once, in the time of one step, for runs of any length and whatever their
-numbers. Only a solve that would go otherwise (more cycles for a stiffer fluid) has them captured anew.
+A step, whose stages a `wp.Tape` records, is captured in two graphs: a loop of steps forward, and a loop of
+the tape played back. Of each step only its state is kept: what else the tape reads is computed again, but
+for the solves. Both loops find in device memory which step they are at (`kernels/adjoint/step_table.py`):
+the state it begins with, the numbers of what acts, where to leave what they find. So they are captured
+once, in the time of one step, for runs of any length and whatever their numbers. Only a solve by another
+method (more cycles for a stiffer fluid) has them captured anew.
 
-With a cap on memory, segments of the run take turns in the same tables (`schedule`).
+With a cap on memory, segments of the run take turns in the same tables (`checkpoints`).
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from wfluid.gradient.step_tables import StepCounter, StepTable
 from wfluid.gradient.variables import Setup
 from wfluid.kernels.adjoint import misfit
 from wfluid.kernels.cell.strips import STRIP, repeat_while
-from wfluid.step.adjoint import StepAdjoint
 from wfluid.step.forcing import Forcing
 from wfluid.step.step import Step
+from wfluid.step.tape import recording
 
 MEGABYTE = 2**20
 
@@ -81,7 +82,7 @@ class Recording:
 
     def __init__(
         self,
-        stages: Step,
+        step: Step,
         setup: Setup,
         timeline: Timeline,
         stretch: StepRange,
@@ -91,15 +92,16 @@ class Recording:
         effort: bool = False,
         room: int = 0,
     ):
-        self.stages, self.timeline, self.device = stages, timeline, stages.device
+        self.step, self.timeline, self.device = step, timeline, step.device
         self._stretch, self._terms = stretch, terms
         self._term_replays: dict[Callable, CapturedGraph] = {}
-        grid, device = stages.grid, stages.device
+        grid, device = step.grid, step.device
         self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
         load_kernels(device)
-        self._adjoint = StepAdjoint(stages, timeline.dt, of_viscosity, self._effort)
+        self._of_viscosity = of_viscosity
+        step.allow_gradients(of_viscosity)
         self._before, self._after, self._bar, self._after_bar = (
-            State.at_rest(grid, device, len(stages.densities), len(stretch.points))
+            State.at_rest(grid, device, len(step.densities), len(stretch.points))
             for _ in range(WORKING_STATES)
         )
         self._before.take_gradient(self._bar)
@@ -113,18 +115,18 @@ class Recording:
         self.room = rows
         self._states = [StepTable(a, rows + 1) for a in self._kept(self._before)]
         self._stored = [StepTable(a, stored) for a in self._kept(self._before)]
-        self._impulses = Forcing(setup.forces, setup.fluid, grid, device, gradients=True)
+        self._forcing = Forcing(setup.forces, setup.fluid, grid, device, gradients=True, effort=self._effort)
         self._numbers, self._boxes, self._bars = (
-            StepTable(a, rows) for a in (self._impulses.numbers, self._impulses.boxes, self._impulses.bars)
+            StepTable(a, rows) for a in (self._forcing.numbers, self._forcing.boxes, self._forcing.bars)
         )
         self._pulls = [StepTable(p, rows + 1) for p in self._before.particles]
-        changes = stages.medium and stages.medium.changes
-        self._viscosities = StepTable(stages.medium.painted_mu, rows) if changes else None
+        changes = step.medium and step.medium.changes
+        self._viscosities = StepTable(step.medium.painted_mu, rows) if changes else None
         self._squares = zeros(2 * grid.ny if effort else 0, device)
         self._square_rows = StepTable(self._squares, rows)
-        self._counter, self._pool = StepCounter(device), stages.helpers(alone=True)
+        self._counter, self._pool = StepCounter(device), step.helpers(alone=True)
         self._preparation: CapturedGraph | None = None
-        self._tapes: dict[int, wp.Tape] = {}
+        self._tape = wp.Tape()
         self._plan: tuple = ()
         self.set(setup)
 
@@ -156,20 +158,20 @@ class Recording:
             and effort == bool(self._effort)
             and stretch.last - stretch.first <= self.room
             and len(stretch.points) == len(self._stretch.points)
-            and setup.fluid is self.stages.fluid
+            and setup.fluid is self.step.fluid
             and Forcing.key(setup.forces) == Forcing.key(self._setup.forces)
         )
 
     def _kept(self, state: State) -> list[wp.array]:
         """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
-        fields = state.fields if self.stages.medium else [f for f in state.fields if f is not state.q]
+        fields = state.fields if self.step.medium else [f for f in state.fields if f is not state.q]
         return [*fields, *state.particles]
 
     def _planned(self, memory_mb: float | None) -> Schedule:
         breaks = [step for step, terms in self._terms.items() if terms]
         if memory_mb is None:
             return even_segments(self.steps, breaks=breaks)
-        medium, row = self.stages.medium, sum(a.capacity for a in self._kept(self._before))
+        medium, row = self.step.medium, sum(a.capacity for a in self._kept(self._before))
         if medium and medium.changes:
             row += self._before.u.capacity  # each step's own viscosity
         each = row / MEGABYTE
@@ -178,8 +180,8 @@ class Recording:
         except ValueError:
             least = math.ceil(100 * (least_room(self.steps, breaks) + WORKING_STATES) * each) / 100
             raise ValueError(
-                f"memory_mb {memory_mb:g}: {self.steps} steps on {self.stages.grid.nx} x "
-                f"{self.stages.grid.ny} cells need at least {least:g}"
+                f"memory_mb {memory_mb:g}: {self.steps} steps on {self.step.grid.nx} x "
+                f"{self.step.grid.ny} cells need at least {least:g}"
             ) from None
 
     @property
@@ -199,44 +201,46 @@ class Recording:
         Raises:
             ValueError: a force beyond the limit.
         """
-        self._setup, stages, dt = setup, self.stages, self.timeline.dt
+        self._setup, dt = setup, self.timeline.dt
         rows, swelled = [], False
         before = min(1, self._stretch.first)  # the step before decides what of its pressure is kept
-        for step in range(-before, self.steps):
-            kept = stages.kept(dt, dt if self._stretch.first + step else 0.0, swelled)
-            t, until = self.time_of(step), self.time_of(step + 1)
-            rows.append(self._impulses.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
-            swelled = self._impulses.prescribed > 0
-        columns = zip(*rows[before:], strict=True)
-        self._all_numbers, self._all_boxes = (np.stack(column) for column in columns)
-        stages.take_fluid(setup.fluid)
+        for n in range(-before, self.steps):
+            kept = self.step.kept(dt, dt if self._stretch.first + n else 0.0, swelled)
+            t, until = self.time_of(n), self.time_of(n + 1)
+            rows.append(self._forcing.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
+            swelled = rows[-1].prescribed > 0
+        self._all_numbers = np.stack([row.numbers for row in rows[before:]])
+        self._all_boxes = np.stack([row.boxes for row in rows[before:]])
+        self.step.take_fluid(setup.fluid)
         if self._viscosities:
-            plan = stages.expect([self.time_of(step + 1) for step in range(self.steps)], dt)
+            plan = self.step.expect([self.time_of(n + 1) for n in range(self.steps)], dt)
         else:
-            plan = stages.plan(self.time_of(1), dt, self._prepare)
+            plan = self.step.plan(self.time_of(1), dt, self._prepare)
         if plan != self._plan:
             self._plan = ()  # should the captures be interrupted
+            self.step.allow_gradients(self._of_viscosity)
             forward = CapturedGraph(self.device, self._record, self._pool)
             backward = CapturedGraph(self.device, self._play_back, self._pool)
             self._forward, self._backward, self._plan = forward, backward, plan
 
     def _prepare(self) -> None:
         if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self.stages.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self.step.follow_medium, self._pool)
         self._preparation.launch()
 
     def _record(self) -> None:
-        """Steps in a loop, and one of them on a tape; launches only."""
-        tape, counter, impulses = wp.Tape(), self._counter, self._impulses
-        before, after = self._before, self._after
+        """Steps in a loop; the tape records one of them; launches only."""
+        counter, forcing, before, after = self._counter, self._forcing, self._before, self._after
 
-        def step() -> None:
-            self._numbers.take(counter, impulses.numbers)
-            self._boxes.take(counter, impulses.boxes)
+        def work() -> None:
+            self._numbers.take(counter, forcing.numbers)
+            self._boxes.take(counter, forcing.boxes)
             self._take_viscosity()
-            self.stages.advance(before, after, impulses)
-            back = partial(self._adjoint.reverse, before, impulses, self._after_bar, self._bar)
-            record(tape, back, before, after)
+            if _first_strip():  # what the others launch is the same
+                with recording() as self._tape:
+                    self.step.advance(before, after, forcing)
+            else:
+                self.step.advance(before, after, forcing)
             if self._squares.size:
                 self._measure_effort()
                 self._square_rows.give(counter, self._squares)
@@ -245,23 +249,22 @@ class Recording:
                 table.copy(f, to)
             counter.count(1)
 
-        repeat_while(counter.going, step)
-        self._tapes[_strip()] = tape
+        repeat_while(counter.going, work)
 
     def _take_viscosity(self) -> None:
         """Take the step's own viscosity, where it depends on the time; launches only."""
         if not self._viscosities:
             return
-        medium = self.stages.medium
+        medium = self.step.medium
         self._viscosities.take(self._counter, medium.painted_mu)
         medium.fill_painted()
-        if not self.stages.fluid.viscosity_moves:  # else it is taken along in the step
-            self.stages.follow_medium()
+        if not self.step.fluid.viscosity_moves:  # else it is taken along in the step
+            self.step.follow_medium()
 
     def _measure_effort(self) -> None:
         """Squares of what forces add to the velocity, summed along rows; launches only."""
-        state, layout = self._before, self.stages.layout
-        pushed = self.stages.push(state, self._impulses)
+        state, layout = self._before, self.step.layout
+        pushed = self.step.pushed if self._forcing.pushes else (state.u, state.v)
         for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
             inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
             misfit.row_squares.launch(layout.ny, self.device, inputs, [self._squares])
@@ -271,17 +274,18 @@ class Recording:
         repeat_while(self._counter.going, self._step_back)
 
     def _step_back(self) -> None:
-        counter, impulses, before = self._counter, self._impulses, self._before
+        counter, forcing, before = self._counter, self._forcing, self._before
         counter.count(-1)
-        self._numbers.take(counter, impulses.numbers)
-        self._boxes.take(counter, impulses.boxes)
+        self._numbers.take(counter, forcing.numbers)
+        self._boxes.take(counter, forcing.boxes)
         self._take_viscosity()
         for table, f in zip(self._states, self._kept(before), strict=True):
             table.take(counter, f)
         for pulls, bar in zip(self._pulls, self._after_bar.particles, strict=True):
             pulls.add_to(counter, bar, ahead=1)
-        self._tapes[_strip()].backward()
-        self._bars.give(counter, impulses.bars)
+        self.step.recompute(before, forcing)
+        self._tape.backward()
+        self._bars.give(counter, forcing.bars)
         bars = zip(self._states, self._kept(self._bar), self._kept(self._after_bar), strict=True)
         for table, f, to in bars:
             table.copy(f, to)
@@ -323,7 +327,7 @@ class Recording:
 
     def _places_at(self, row: int) -> np.ndarray:
         columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
-        return np.stack(columns, axis=1) * (self.stages.grid.hx, self.stages.grid.hy)
+        return np.stack(columns, axis=1) * (self.step.grid.hx, self.step.grid.hy)
 
     def first_step_not_finite(self) -> int | None:
         """The first step after which the fluid is not finite, run again; None where it stays so."""
@@ -355,19 +359,20 @@ class Recording:
                 bars[action.start : action.end] = self._bars.rows(base, base + length)
             else:
                 self._do(action)
-        layout, numbers = self.stages.layout, self._all_numbers
+        layout, numbers = self.step.layout, self._all_numbers
         velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
-        self._adjoint.fold_viscosity()
+        if self.step.medium:
+            self.step.medium.fold_painted()
         return RunGradients(
             np.stack(velocity),
-            to_numpy(self._adjoint.mu_bar, layout).astype(np.float64),
-            self._impulses.gradients(numbers, bars),
-            self._impulses.source_gradients(numbers, bars),
+            to_numpy(self.step.mu_bar, layout).astype(np.float64),
+            self._forcing.gradients(numbers, bars),
+            self._forcing.source_gradients(numbers, bars),
         )
 
     def _clear(self) -> None:
         """Begin with no gradients."""
-        fill(0.0, self._adjoint.mu_bar)
+        fill(0.0, self.step.mu_bar)
         self._after_bar.zero_()
 
     def _reverse(
@@ -380,7 +385,7 @@ class Recording:
             self._copy([table.row(base + length) for table in self._states], self._kept(self._before))
         for term in terms:
             self._replay(term, term.adjoint).launch()
-        scales = (self.stages.grid.hx, self.stages.grid.hy)
+        scales = (self.step.grid.hx, self.step.grid.hy)
         for axis, (table, h) in enumerate(zip(self._pulls, scales, strict=True)):
             rows = np.zeros((length, table.size))
             for n in range(length):
@@ -409,7 +414,7 @@ class Recording:
 
     def _begin(self) -> None:
         """The state at the beginning: what was given, or at rest but for the velocity."""
-        state, stages, grid = self._before, self.stages, self.stages.grid
+        state, step, grid = self._before, self.step, self.step.grid
         for p, column, h in zip(state.particles, self._stretch.points.T, (grid.hx, grid.hy), strict=True):
             assign(column / h, p)
         if self._stretch.begun:
@@ -417,11 +422,11 @@ class Recording:
                 copy(a, b)
             return
         fill(0.0, *state.fields)
-        for density, rho in zip(stages.densities, state.rho, strict=True):
+        for density, rho in zip(step.densities, state.rho, strict=True):
             density.begin(rho)
-        pairs = zip(self._setup.velocity, (state.u, state.v), stages.velocity_ghosts, strict=True)
+        pairs = zip(self._setup.velocity, (state.u, state.v), step.velocity_ghosts, strict=True)
         for values, f, ghosts in pairs:
-            from_numpy(values, f, stages.layout)
+            from_numpy(values, f, step.layout)
             ghosts.fill(f)
 
     def _do(self, action: Advance | Store | Restore) -> None:
@@ -443,7 +448,7 @@ class Recording:
         self._boxes.put(base, self._all_boxes[start:end])
         for step in range(start, end) if self._viscosities else ():
             row = self._viscosities.row(base + step - start)
-            from_numpy(self.stages.medium.at(self.time_of(step + 1)), row, self.stages.layout)
+            from_numpy(self.step.medium.at(self.time_of(step + 1)), row, self.step.layout)
         self._copy(self._kept(self._before), [table.row(base) for table in self._states])
 
     def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:
@@ -451,16 +456,7 @@ class Recording:
             copy(a, b)
 
 
-def record(tape: wp.Tape, back: Callable[[], None], read: State, written: State) -> None:
-    """Put a step on a tape; Warp learns what it read and wrote (`wp.config.verify_autograd_array_access`)."""
-    for a in written.arrays:
-        a.mark_write(operation="a step", filename=__file__, lineno=0)
-    for a in read.arrays:
-        a.mark_read()
-    tape.record_func(back, read.arrays + written.arrays)
-
-
-def _strip() -> int:
-    """The strip whose launches are being captured."""
+def _first_strip() -> bool:
+    """Whether the first strip, or the only one, is being captured."""
     strip = STRIP.get()
-    return strip.index if strip else 0
+    return strip is None or strip.index == 0

@@ -33,8 +33,8 @@ class StateObjective(Objective):
         return (self.time,)
 
     @abstractmethod
-    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
-        """It on the device, for the grid and fluid of `stages`; `particles` are its own of the state's."""
+    def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
+        """It on the device, for the grid and fluid of `step`; `particles` are its own of the state's."""
 
 
 class DeviceObjective(ABC):
@@ -70,14 +70,14 @@ class MapMisfit(StateObjective):
     weight: Painted | None = None
     """Where it counts: a factor painted over the picture."""
 
-    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
+    def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device, where displacements are in cells."""
-        grid = stages.grid
+        grid = step.grid
         scales = (grid.hx, grid.hy)
         target = finite_array("MapMisfit.target", self.target, (2, grid.ny, grid.nx))
         targets = [component / h for component, h in zip(target, scales, strict=True)]
         squares = [weight * h**2 * grid.hx * grid.hy for h in scales]
-        return _FieldMisfit(stages, ("d_x", "d_y"), targets, squares, self.weight)
+        return _FieldMisfit(step, ("d_x", "d_y"), targets, squares, self.weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,15 +97,15 @@ class DensityMisfit(StateObjective):
     weight: Painted | None = None
     """Where it counts: a factor painted over the picture."""
 
-    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
+    def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device."""
-        grid, names = stages.grid, stages.fluid.density_names
+        grid, names = step.grid, step.fluid.density_names
         if self.density not in names:
             there = ", ".join(names) or "none"
             raise ValueError(f"DensityMisfit of {self.density!r}: expected one of the fluid's ({there})")
         target = finite_array("DensityMisfit.target", self.target, (grid.ny, grid.nx))
         squares = [weight * grid.hx * grid.hy]
-        return _FieldMisfit(stages, (names.index(self.density),), [target], squares, self.weight)
+        return _FieldMisfit(step, (names.index(self.density),), [target], squares, self.weight)
 
 
 class _FieldMisfit(DeviceObjective):
@@ -113,13 +113,13 @@ class _FieldMisfit(DeviceObjective):
 
     def __init__(
         self,
-        stages: Step,
+        step: Step,
         names: Sequence[str | int],
         targets: Sequence[np.ndarray],
         squares: Sequence[float],
         paint: Painted | None,
     ):
-        self._names, self.layout, self.device, grid = names, stages.layout, stages.device, stages.grid
+        self._names, self.layout, self.device, grid = names, step.layout, step.device, step.grid
         fields = len(names)
         self._targets, self._weights, self._left, self._weighted = (
             vector(self.layout, self.device, fields) for _ in range(4)
@@ -186,9 +186,9 @@ class WarpObjective(StateObjective):
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))
 
-    def term(self, stages: Step, weight: float, particles: slice) -> DeviceObjective:
+    def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
         """On the device."""
-        return _Program(self.program, weight, particles, stages.device)
+        return _Program(self.program, weight, particles, step.device)
 
 
 class _Program(DeviceObjective):

@@ -49,6 +49,7 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, flatten
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.step.diffusion import SURE_TOLERANCE
+from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.quality import measure_map
@@ -358,19 +359,17 @@ def _tracks(
     solver: Solver, timeline: Timeline, forces: Sequence[Force], points: np.ndarray, maps: Sequence[int] = ()
 ) -> tuple[np.ndarray, dict[int, CoordinateMap], tuple[float, float]]:
     """Where points are after every step (steps + 1, n, 2), the map after some of them, and its det J."""
-    now, then = solver.rest(points), solver.rest(points)
-    tracks, found, least, greatest = [now.points], {}, 1.0, 1.0
-    for step in range(timeline.steps):
-        t, until = timeline.time_of(step), timeline.time_of(step + 1)
-        solver.step(now, then, forces, t, timeline.dt, until=until)
-        now, then = then, now
+    states = solver.rest(points), solver.rest(points)
+    tracks, found, least, greatest = [states[0].points], {}, 1.0, 1.0
+    advance = steps_of(solver, timeline, forces)
+    for step, (now, _) in enumerate(march(*states, range(timeline.steps), advance), start=1):
         tracks.append(now.points)
-        ends_a_frame = bool(maps) and (step + 1) % timeline.steps_per_frame == 0
-        if step + 1 not in maps and not ends_a_frame:
+        ends_a_frame = bool(maps) and step % timeline.steps_per_frame == 0
+        if step not in maps and not ends_a_frame:
             continue
         warp = CoordinateMap.of_state(now, solver.fluid.walls)
-        if step + 1 in maps:
-            found[step + 1] = warp
+        if step in maps:
+            found[step] = warp
         if ends_a_frame:
             quality = measure_map(now, warp)
             least, greatest = min(least, quality.jacobian_min), max(greatest, quality.jacobian_max)

@@ -40,6 +40,9 @@ _COMPRESSIONS = {
     ".tif": ("none", "lzw", "zip", "packbits"),
     ".tiff": ("none", "lzw", "zip", "packbits"),
 }
+QUALITY_LIMIT = 100
+"""Best quality of a lossy format; 1 is the poorest."""
+
 QUALITIES = {".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp"}
 
 LINEAR = ("half", "float")
@@ -71,8 +74,8 @@ class Encoding:
         known = sorted({name for names in _COMPRESSIONS.values() for name in names})
         if self.compression is not None:
             check_word("compression", self.compression, known, PictureError)
-        if self.quality is not None and not 1 <= self.quality <= 100:
-            raise PictureError(f"quality {self.quality}: expected 1 … 100")
+        if self.quality is not None and not 1 <= self.quality <= QUALITY_LIMIT:
+            raise PictureError(f"quality {self.quality}: expected 1 … {QUALITY_LIMIT}")
 
     def check(self, path: Path) -> None:
         """Refuse settings that the format of `path` does not support.

@@ -13,6 +13,8 @@ Row = tuple[float, float, float]
 """A time [s], x and y [px]."""
 
 POINT = numbers(2, "two numbers, [x, y]")
+POINTS = rows(2, 1, "a list of points, [[x, y], …]")
+SIZE = numbers(2, "two numbers, [width, height]")
 PATH = rows(3, 2, "two rows or more of [seconds, x, y]")
 
 SEED_LIMIT = 2**32 - 1

@@ -9,39 +9,40 @@ from __future__ import annotations
 from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS
 from wfluid.domain.limits import (
     AMOUNT_LIMIT,
-    BLEND_SPACES,
-    CURVES,
     CYCLES,
     CYCLES_LIMIT,
-    DELAY,
-    DELAY_LIMIT,
     DRAG,
     DRAG_LIMIT,
-    EASE,
     FIRST_FRAME,
-    FITS,
     INK_CODE,
     KEYFRAME_VISCOSITY,
     LOOKS,
-    MORPH_TOLERANCE,
     MORPH_VISCOSITY,
     PAINTED_VISCOSITY,
     SCHEMES,
     SIZE_LIMIT,
     SOLVERS,
-    TOLERANCE,
     VISCOSITY,
     VISCOSITY_LIMIT,
 )
-from wfluid.domain.timeline import FPS_LIMIT, LEAST_FPS, LOOPS, SCENE_FPS, SUBSTEPS_LIMIT
+from wfluid.domain.timeline import (
+    FPS_LIMIT,
+    KEYFRAME_STEPS,
+    LEAST_FPS,
+    LOOPS,
+    SCENE_FPS,
+    STEPS_PER_SECOND,
+    SUBSTEPS_LIMIT,
+)
 from wfluid.domain.walls import Wall
-from wfluid.pictures.formats import COLORSPACES, TYPES, Encoding
+from wfluid.pictures.formats import COLORSPACES, QUALITY_LIMIT, TYPES, Encoding
 from wfluid.pictures.sampling import EDGE, EDGES, FILTER, FILTERS
 from wfluid.scene.forces import (
     ENVELOPES,
     FORCES,
-    POINT,
+    POINTS,
     SEED_LIMIT,
+    SIZE,
     Blow,
     EnvelopeTable,
     Factor,
@@ -51,11 +52,15 @@ from wfluid.scene.forces import (
     Spot,
     Window,
 )
+from wfluid.scene.keyframes import KeyframesTable, MorphTable
 from wfluid.scene.schema import SceneTable, array, file_key, key, mapping, optional, table, table_of
-from wfluid.scene.types import color, curve, flag, names, number, numbers, rows, text, version, whole, word
+from wfluid.scene.types import color, flag, names, number, text, version, whole, word
 
 VERSION = 1
 """Of the format that this file describes."""
+
+DURATION = 2.0
+"""Length of a scene that names none, and whose keyframes name no time [s]."""
 
 SELF = "self"
 """What stands for the animated picture where a painting is named."""
@@ -63,11 +68,8 @@ SELF = "self"
 _OF_POINTS = "a morph goes without: its flow follows from its points"
 _OF_STEPS = "a morph goes without: its flow has steps of its own"
 _OF_LOOPS = "a morph goes without: set pingpong of [morph]"
-_OF_TIMES = "a morph goes without: its points arrive at its end"
 
 _AREA = "longer side^2/s"
-_SIZE = numbers(2, "two numbers, [width, height]")
-_POINTS = rows(2, 1, "a list of points, [[x, y], …]")
 _WHITE = "viscosity, or that of the image's white"
 
 
@@ -76,10 +78,10 @@ class PictureTable(SceneTable):
 
     file: str = file_key("the picture", painting=False, required=True, form="PICTURE")
     size: Point | None = key(
-        "width and height that the scene's pixels refer to", _SIZE, unit="px", otherwise="the picture's"
+        "width and height that the scene's pixels refer to", SIZE, unit="px", otherwise="the picture's"
     )
     colorspace: str = key(
-        "what its numbers are", word(*COLORSPACES), default=COLORSPACES[0], flag="--colorspace"
+        "colour space of its numbers", word(*COLORSPACES), default=COLORSPACES[0], flag="--colorspace"
     )
 
 
@@ -90,14 +92,19 @@ class FluidTable(SceneTable):
         "cells along the longer side", whole(LEAST_CELLS, CELLS_LIMIT), default=CELLS, flag="--cells"
     )
     walls: str = key(
-        "free-slip, no-slip, periodic, or two of them as x,y",
+        f"{', '.join(wall.value for wall in Wall)}, or two of them as x,y",
         text(),
         default=Wall.FREE_SLIP.value,
         flag="--walls",
     )
-    scheme: str = key("standard, or the paper's", word(*SCHEMES), default=SCHEMES[0], flag="--scheme")
+    scheme: str = key(
+        "numerical scheme (paper: Euler, bilinear, Jacobi, phase 0)",
+        word(*SCHEMES),
+        default=SCHEMES[0],
+        flag="--scheme",
+    )
     solver: str | None = key(
-        "of pressure and diffusion", word(*SOLVERS), otherwise="by scheme", flag="--solver"
+        "solver of pressure and diffusion", word(*SOLVERS), otherwise="by scheme", flag="--solver"
     )
     pressure_cycles: int = key(
         "multigrid cycles a projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
@@ -126,7 +133,7 @@ class ViscosityTable(SceneTable):
         flag="--viscosity",
     )
     image: str | None = file_key(
-        "stiff where this picture is bright (self: the animated one)",
+        "a picture, bright where the fluid is stiff; self is the animated one",
         flag="--viscosity-image",
         metavar="FILE|self",
     )
@@ -161,17 +168,17 @@ class TimeTable(SceneTable):
     """When frames are shown."""
 
     duration: float | None = key(
-        "length",
+        "length of the animation",
         number(above=0),
         unit="s",
-        otherwise="that of the last keyframe, or 2",
+        otherwise=f"that of the last keyframe, or {DURATION:g}",
         flag="--duration",
     )
     fps: float = key("frames a second", number(LEAST_FPS, FPS_LIMIT), default=SCENE_FPS, flag="--fps")
     substeps: int | None = key(
         "steps a frame",
         whole(1, SUBSTEPS_LIMIT),
-        otherwise="steps of at most 1/96 s, with keyframes 1/48 s",
+        otherwise=f"steps of at most 1/{STEPS_PER_SECOND} s, with keyframes 1/{KEYFRAME_STEPS} s",
         flag="--substeps",
         not_in_morph=_OF_STEPS,
     )
@@ -188,13 +195,15 @@ class FramesTable(SceneTable):
     """What they look like."""
 
     width: int | None = key(
-        "their width", whole(1, SIZE_LIMIT), unit="px", otherwise="the picture's", flag="--width"
+        "width of the frames", whole(1, SIZE_LIMIT), unit="px", otherwise="the picture's", flag="--width"
     )
-    scale: float | None = key("their size as a factor, instead of width", number(above=0), flag="--scale")
+    scale: float | None = key(
+        "size of the frames as a factor, instead of width", number(above=0), flag="--scale"
+    )
     filter: str = key(
-        "how the picture is read between pixels", word(*FILTERS), default=FILTER, flag="--filter"
+        "interpolation between the picture's pixels", word(*FILTERS), default=FILTER, flag="--filter"
     )
-    edge: str = key("what lies beyond the picture", word(*EDGES), default=EDGE, flag="--edge")
+    edge: str = key("what lies beyond the picture's edges", word(*EDGES), default=EDGE, flag="--edge")
 
 
 class GroupTable(SceneTable):
@@ -243,98 +252,7 @@ class LayerTable(SceneTable):
 class TracksTable(SceneTable):
     """Points that are followed."""
 
-    points: tuple[Point, ...] = key("where they begin", _POINTS, unit="px", default=(), form="--track")
-
-
-class MoveTable(SceneTable):
-    """A point that should be somewhere; several of one point make a path."""
-
-    start: Point = key("its place in the untouched picture", POINT, name="from", unit="px", required=True)
-    to: Point = key("where it should be", POINT, unit="px", required=True)
-    time: float | None = key(
-        "when", number(above=0), unit="s", otherwise="that of all", not_in_morph=_OF_TIMES
-    )
-    weight: float = key("how much it counts beside others", number(above=0), default=1.0)
-
-
-class FoundTable(SceneTable):
-    """A force found before, as a saved scene has it: the search goes on from there."""
-
-    center: Point = key("where it acts", POINT, unit="px", required=True)
-    vector: Point = key("acceleration at its centre", POINT, unit="px/s^2", required=True)
-    radius: float = key("sigma of its Gaussian", number(above=0), unit="px", required=True)
-    start: float = key("when it begins", number(0), unit="s", required=True)
-    end: float = key("when it ends", number(above=0), unit="s", required=True)
-
-
-class KeyframesTable(SceneTable):
-    """Where points arrive: forces are found that take them there."""
-
-    moves: tuple[MoveTable, ...] = array(MoveTable, name="move")
-    points: str | None = file_key("moves in a CSV file: from x, y, to x, y, perhaps time", painting=False)
-    time: float | None = key(
-        "of moves that name none",
-        number(above=0),
-        unit="s",
-        otherwise="the duration",
-        not_in_morph=_OF_TIMES,
-    )
-    pins: tuple[Point, ...] = key(
-        "points that stay in their place until the last keyframe",
-        _POINTS,
-        unit="px",
-        default=(),
-        form="--pin",
-    )
-    tolerance: float | None = key(
-        "how far a point may end from its keyframe",
-        number(above=0),
-        unit="px",
-        otherwise=f"{512 * TOLERANCE:g}, of a picture of 512; a morph's {512 * MORPH_TOLERANCE:g}",
-        flag="--tolerance",
-    )
-    found: tuple[FoundTable, ...] = array(FoundTable, name="force")
-
-
-Curve = str | tuple[tuple[float, float], ...]
-"""A curve's name, or its keys."""
-
-
-class MorphTable(SceneTable):
-    """Another picture, into which this one flows; keyframes lead from points of this to points of it."""
-
-    to: str = file_key("the other picture", painting=False, required=True, form="B")
-    size: Point | None = key("frame size that its pixels refer to", _SIZE, unit="px", otherwise="its own")
-    fit: str = key("how it covers the frame", word(*FITS), default=FITS[0], flag="--fit")
-    warp_curve: Curve = key(
-        "how far points are on their ways: linear, ease, or [[s, 0 … 1], …]",
-        curve(CURVES),
-        default=EASE,
-        flag="--warp-curve",
-        metavar="CURVE",
-    )
-    blend_curve: Curve = key(
-        "how much of it is seen, the same",
-        curve(CURVES),
-        default=EASE,
-        flag="--blend-curve",
-        metavar="CURVE",
-    )
-    blend: str = key(
-        "what is mixed: light, or display values",
-        word(*BLEND_SPACES),
-        default=BLEND_SPACES[0],
-        flag="--blend",
-    )
-    timing: str | None = file_key("a mask, white where it happens first", form="--timing")
-    delay: float = key(
-        "how much later it happens where the mask is black, a part of the duration",
-        number(0, DELAY_LIMIT),
-        default=DELAY,
-        form="--timing MASK:DELAY",
-    )
-    reverse: bool = key("from the other picture to this", flag(), default=False, flag="--reverse")
-    pingpong: bool = key("there and back", flag(), default=False, flag="--pingpong")
+    points: tuple[Point, ...] = key("where they begin", POINTS, unit="px", default=(), form="--track")
 
 
 class OutputTable(SceneTable):
@@ -349,9 +267,11 @@ class OutputTable(SceneTable):
     start: int = key(
         "number of a sequence's first frame", whole(0, 10**9), default=FIRST_FRAME, flag="--start"
     )
-    type: str | None = key("numbers of a sequence", word(*TYPES), otherwise="the picture's", flag="--type")
-    compression: str | None = key("of EXR and TIFF sequences", text(), flag="--compression")
-    quality: int | None = key("of JPEG and WebP sequences", whole(1, 100), flag="--quality")
+    type: str | None = key(
+        "number type of a sequence", word(*TYPES), otherwise="the picture's", flag="--type"
+    )
+    compression: str | None = key("compression of EXR and TIFF sequences", text(), flag="--compression")
+    quality: int | None = key("quality of JPEG and WebP sequences", whole(1, QUALITY_LIMIT), flag="--quality")
 
     @property
     def encoding(self) -> Encoding:
@@ -368,7 +288,7 @@ class SceneTables(SceneTable):
 
     wfluid: int = key("version of the format", version(VERSION), required=True)
     seed: int = key(
-        "of noises that name none, and of keyframes", whole(0, SEED_LIMIT), default=0, flag="--seed"
+        "seed of noises that name none, and of keyframes", whole(0, SEED_LIMIT), default=0, flag="--seed"
     )
     picture: PictureTable = optional(PictureTable)
     fluid: FluidTable = table(FluidTable)

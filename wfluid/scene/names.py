@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
+from wfluid.scene.checking import parts
 from wfluid.scene.forces import BuoyancyTable
 from wfluid.scene.format import SCENE, SceneTables
-from wfluid.scene.schema import SchemaError, Table, parts
+from wfluid.scene.schema import SchemaError, Table
 from wfluid.scene.types import nearest
 
 SHOWN = ("picture", "tracks", "report")
@@ -41,7 +43,7 @@ def check_names(scene: SceneTables) -> None:
             raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
 
 
-def check_morph(tables: dict) -> None:
+def check_morph(tables: Mapping[str, Any]) -> None:
     """Refuse what a morph has no use for.
 
     Raises:

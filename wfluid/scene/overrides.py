@@ -35,10 +35,11 @@ def set_value(tables: Any, path: list[str], value: Any, setting: str) -> None:
         SceneError: a table of a list that does not exist; begins with `setting`.
     """
     at = tables
+    step: str | int
     for n, step in enumerate(path):
         last = n == len(path) - 1
         if isinstance(at, list):
-            step = _item(at, step, setting)
+            step = _item(at, path[n], setting)
         elif isinstance(at, dict):
             if not last and step not in at:
                 at[step] = {}

@@ -13,23 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from wfluid.domain.timeline import Timeline
-from wfluid.scene.format import SCENE, SELF, SceneTables
+from wfluid.scene.checking import attributes_of, checked, parts, replaced
+from wfluid.scene.format import DURATION, SCENE, SELF, SceneTables
 from wfluid.scene.names import check_morph, check_names
 from wfluid.scene.overrides import copied, parse_value, set_value
-from wfluid.scene.schema import (
-    Key,
-    SceneError,
-    SchemaError,
-    attributes_of,
-    blame,
-    checked,
-    dotted,
-    parts,
-    replaced,
-)
-
-DURATION = 2.0
-"""Length of a scene that names none, and whose keyframes name no time [s]."""
+from wfluid.scene.schema import Key, SceneError, SchemaError, blame, dotted
 
 
 class Scene(SceneTables):
@@ -154,7 +142,8 @@ class Scene(SceneTables):
             SceneError: a length or a rate that makes no sense.
         """
         time, keyframes = self.time, self.keyframes
-        named = [one.time for one in (keyframes, *keyframes.moves) if one.time] if keyframes else []
+        times = [keyframes.time, *(move.time for move in keyframes.moves)] if keyframes else []
+        named = [at for at in times if at is not None]
         # no frame falls short of the last keyframe
         until = math.ceil(max(named) * time.fps - 1e-6) / time.fps if named else DURATION
         duration = until if time.duration is None else time.duration

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from wfluid.scene.checking import checked
 from wfluid.scene.forces import FORCES
-from wfluid.scene.schema import SchemaError, checked
+from wfluid.scene.schema import SchemaError
 from wfluid.scene.types import as_number
 
 FORMS = {

@@ -11,7 +11,7 @@ from wfluid.animation.loops import check_loop
 from wfluid.domain.envelopes import Constant, product
 from wfluid.domain.limits import INK, MORPH_TOLERANCE, MORPH_VISCOSITY, TOLERANCE, VISCOSITY
 from wfluid.domain.paths import Place
-from wfluid.domain.timeline import substeps_for
+from wfluid.domain.timeline import KEYFRAME_STEPS, substeps_for
 from wfluid.files.points import read_points
 from wfluid.keyframes.keyframes import ParticleKeyframe, targets_of
 from wfluid.model.densities import Density, PaintedSource, Source
@@ -24,27 +24,21 @@ from wfluid.pictures.color import linear_color
 from wfluid.pictures.pairing import PicturePair, paired
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture
+from wfluid.scene.forces import SEED_LIMIT
 from wfluid.scene.format import (
     DensityTable,
-    FoundTable,
     FramesTable,
     GroupTable,
-    MorphTable,
     PictureTable,
     SourceTable,
 )
+from wfluid.scene.keyframes import FoundTable, MorphTable
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SchemaError, blame
 from wfluid.staging.aims import Aims
 from wfluid.staging.drawing import Drawing
 from wfluid.staging.images import SAME_ASPECT, SceneImages
 from wfluid.staging.timing import envelope_and_scale
-
-KEYFRAME_STEPS = 48
-"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
-
-SEEDS = 2**32
-"""How many seeds of random numbers there are."""
 
 
 def stage(
@@ -303,7 +297,7 @@ class _Builder:
         members |= {group.name: [] for group in self.scene.groups}
         for n, table in enumerate(self.scene.forces):
             with blame("force", n):
-                force = self.drawing.force(table, (self.scene.seed + n) % SEEDS)
+                force = self.drawing.force(table, (self.scene.seed + n) % (SEED_LIMIT + 1))
             self._note_small(n, force)
             members[table.group].append(force)
         for n, group in enumerate(self.scene.groups):

@@ -26,6 +26,7 @@ from wfluid.model.painted import Freeze, Painted
 from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Buoyancy, Wind
 from wfluid.pictures.picture import resample
+from wfluid.scene.checking import checked, made
 from wfluid.scene.forces import (
     FORCES,
     BuoyancyTable,
@@ -48,7 +49,7 @@ from wfluid.scene.forces import (
     VortexTable,
     WindTable,
 )
-from wfluid.scene.schema import blame, checked, made
+from wfluid.scene.schema import blame
 from wfluid.staging.images import SceneImages
 from wfluid.staging.timing import envelope_and_scale, phase_of, time_window
 

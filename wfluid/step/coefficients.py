@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,9 @@ import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.fields.arrays import assign, from_numpy, where, zeros
+from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
+from wfluid.kernels.adjoint import transport as transport_adjoint
 from wfluid.kernels.solve import stress
 from wfluid.kernels.step import transport
 from wfluid.model.fluid import Fluid
@@ -19,6 +22,7 @@ from wfluid.model.painted import Painted, check_painted, sample_at
 from wfluid.solve.multigrid import hierarchy
 from wfluid.solve.operators import CoefficientLevel
 from wfluid.solve.transfer import Averaging
+from wfluid.step.tape import attach_gradients, record
 
 REACH = 3
 """Cells over which a jump is looked for: coarser levels see the rise of a few cells as one."""
@@ -57,7 +61,7 @@ class Coefficients:
             ]
             for pair in pairs
         ]
-        self._dt = zeros(1, device)
+        self.dt = zeros(1, device)
         self._now: tuple[float, float] | None = None
         top = self.levels[0]
         self._painted = (
@@ -79,7 +83,7 @@ class Coefficients:
         self.mu = self.at(t)
         from_numpy(self.mu, self._painted.mu, self._painted.layout)
         self.fill_painted()
-        assign([dt], self._dt)
+        assign([dt], self.dt)
         self._now = now
         return True
 
@@ -100,7 +104,7 @@ class Coefficients:
             ValueError: as `at`.
         """
         self.invalidate()
-        assign([dt], self._dt)
+        assign([dt], self.dt)
         self.mu = self.at(times[0])
         for t in times[1:]:
             self.mu = np.maximum(self.mu, self.at(t))
@@ -123,18 +127,38 @@ class Coefficients:
         """Whether the viscosity depends on the time."""
         return not isinstance(self.fluid.viscosity, float | Painted)
 
+    def allow_gradients(self) -> None:
+        """Allocate the gradient of the viscosity, where the fluid is and where it is painted."""
+        layout = self.levels[0].layout
+        attach_gradients([self.painted_mu, self.levels[0].mu], layout)
+
     def carry(self, state: State) -> None:
         """Take the viscosity along with the picture: launches only."""
-        layout, painted = self.levels[0].layout, self._painted
+        layout, painted, top = self.levels[0].layout, self._painted, self.levels[0]
         inputs = [painted.mu, state.d_x, state.d_y, *where(self.grid, self.fluid.walls, layout)]
-        transport.carried_along.launch(layout, self.device, inputs, [self.levels[0].mu])
+        transport.carried_along.launch(layout, self.device, inputs, [top.mu])
+        record(partial(self._carry_back, state), [painted.mu, state.d_x, state.d_y], [top.mu])
+
+    def _carry_back(self, state: State) -> None:
+        """Add to the gradients of the painted viscosity, ghosts included, and of the displacement."""
+        layout, painted, top = self.levels[0].layout, self._painted, self.levels[0]
+        numbers = where(self.grid, self.fluid.walls, layout)
+        inputs = [painted.mu, state.d_x, state.d_y, top.mu.grad, *numbers]
+        outputs = [painted.mu.grad, state.d_x.grad, state.d_y.grad]
+        transport_adjoint.carried_along_adjoint.launch(layout, self.device, inputs, outputs, turn=0)
+
+    def fold_painted(self) -> None:
+        """The transpose of `fill_painted`: what ghosts have of the gradient goes to the cells."""
+        if self.fluid.viscosity_moves:
+            rules = self.fluid.walls.centre_rules()
+            Ghosts(self.levels[0].layout, rules, self.device).fold(self.painted_mu.grad)
 
     def coarsen(self) -> None:
         """Bring every level up to date with the finest: launches only."""
         top = self.levels[0]
         top.fill()
         for beta, along in zip(top.beta, (1, top.layout.pitch), strict=True):
-            stress.drag_factor.launch(top.layout, self.device, [top.alpha, self._dt, along], [beta])
+            stress.drag_factor.launch(top.layout, self.device, [top.alpha, self.dt, along], [beta])
         top.fill_beta()
         for means, face_means, (fine, coarse) in zip(
             self._means, self._face_means, pairwise(self.levels), strict=True

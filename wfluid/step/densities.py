@@ -1,19 +1,21 @@
-"""A density's part of a step: carried along the flow, poured by its sources, diffused."""
+"""A density's part of a step: carried along the flow, poured by its sources, diffused; with the transpose."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import warp as wp
 
 from wfluid.domain.grid import Grid
 from wfluid.domain.walls import Walls
-from wfluid.fields.arrays import Vector, entries, field, from_numpy
+from wfluid.fields.arrays import Vector, entries, field, from_numpy, vector
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import transport as transport_adjoint
 from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import sources, transport
 from wfluid.model.densities import Density, PaintedSource, Source
 from wfluid.model.fluid import Fluid
@@ -21,6 +23,7 @@ from wfluid.solve.multigrid import Location
 from wfluid.solve.system import SolveMethod
 from wfluid.step.diffusion import ScalarDiffusion
 from wfluid.step.gaussians import GaussianBatch
+from wfluid.step.tape import bars, record
 
 
 class DensitySources:
@@ -111,44 +114,36 @@ class DensityTransport:
             self._diffusion.plan(dt * self.density.diffusion) if self._diffusion else SolveMethod("none", 0)
         )
 
+    def allow_gradients(self) -> None:
+        """Allocate what the transpose needs."""
+        self._carried_bar, *self._foot_bar = vector(self.layout, self.device, 3)
+
     def _diffuses(self) -> bool:
-        return bool(self._diffusion and self._diffusion.how.iterations)
+        return bool(self._diffusion and self._diffusion.method.iterations)
 
     def advance(
-        self,
-        rho: wp.array,
-        foot: Vector,
-        where: Sequence[int],
-        pour: Callable[[wp.array], None],
-        out: wp.array,
+        self, rho: wp.array, foot: Vector, where: Sequence[int], sources: DensitySources, out: wp.array
     ) -> None:
-        """out = the density a step later, with ghosts; `pour` adds what its sources do: launches only."""
+        """out = the density a step later, with ghosts, and with what its sources pour: launches only."""
         carried = self._carried if self._diffuses() else out
         transport.carry_density.launch(self.layout, self.device, [rho, *foot, *where], [carried])
-        pour(carried)
+        sources.add(carried)
         self._ghosts.fill(carried)
         if self._diffuses():
             self._diffusion.diffuse(carried, out)
+        record(partial(self._advance_back, rho, foot, where, sources, out), [rho, *foot], [out])
 
-    def adjoint(
-        self,
-        out_bar: wp.array,
-        rho: wp.array,
-        foot: Vector,
-        where: Sequence[int],
-        pour_adjoint: Callable[[wp.array], None],
-        rho_bar: wp.array,
-        foot_bar: Vector,
+    def _advance_back(
+        self, rho: wp.array, foot: Vector, where: Sequence[int], sources: DensitySources, out: wp.array
     ) -> None:
-        """The transpose of `advance`: adds to `rho_bar`, writes `foot_bar`: launches only."""
-        carried_bar = out_bar
+        """Add to the gradients of the density and of the feet; find those of the sources."""
+        carried_bar = out.grad
         if self._diffuses():
-            carried_bar = self._carried
-            self._diffusion.adjoint(out_bar, carried_bar)
-        pour_adjoint(carried_bar)
-        inputs, outputs = [rho, *foot, carried_bar, *where], [rho_bar, *foot_bar]
+            carried_bar = self._carried_bar
+            self._diffusion.adjoint(out.grad, carried_bar)
+        sources.adjoint(carried_bar)
+        inputs, outputs = [rho, *foot, carried_bar, *where], [rho.grad, *self._foot_bar]
         transport_adjoint.carry_density_adjoint.launch(self.layout, self.device, inputs, outputs, turn=0)
-
-    def fold(self, rho_bar: wp.array) -> None:
-        """Add the gradients with respect to ghosts to those of the cells they copy."""
-        self._ghosts.fold(rho_bar)
+        self._ghosts.fold(rho.grad)
+        for f, to in zip(self._foot_bar, bars(foot), strict=True):
+            algebra.add.launch(self.layout, self.device, [f], [to])

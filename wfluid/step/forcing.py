@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import warp as wp
@@ -16,6 +18,7 @@ from wfluid.fields.state import State
 from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import forces as forces_adjoint
 from wfluid.kernels.cell.layout import Layout
+from wfluid.kernels.cell.strips import together
 from wfluid.kernels.solve import algebra
 from wfluid.kernels.step import forces
 from wfluid.model.fluid import Fluid
@@ -25,19 +28,39 @@ from wfluid.model.painted import Painted
 from wfluid.model.uniform_forces import Buoyancy
 from wfluid.step.densities import DensitySources
 from wfluid.step.gaussians import GaussianForces, GrowthSources
+from wfluid.step.tape import bars, record
 
 _STEP = 5
 """Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
 
 
+@dataclass(frozen=True, eq=False)
+class ForcingRow:
+    """What acts in one step."""
+
+    numbers: np.ndarray
+    """Of the step, the forces and the sources, as `Forcing` lays them out on the device."""
+    boxes: np.ndarray
+    """Of cells that Gaussians reach."""
+    prescribed: float
+    """Sum of the largest divergences that growths prescribe [1/s]."""
+
+
 class Forcing:
     """The numbers of a step with forces of certain kinds, and how they move the fluid.
 
-    Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too.
+    Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too. With
+    `effort` they count that part of half the squares of what forces add to the velocity.
     """
 
     def __init__(
-        self, forces: Sequence[Force], fluid: Fluid, grid: Grid, device: wp.Device, gradients: bool = False
+        self,
+        forces: Sequence[Force],
+        fluid: Fluid,
+        grid: Grid,
+        device: wp.Device,
+        gradients: bool = False,
+        effort: float = 0.0,
     ):
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
         self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
@@ -52,14 +75,15 @@ class Forcing:
                 self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
             elif isinstance(force, Buoyancy):
                 self._lifts.append((n, _index_of(force.density, fluid.density_names)))
-        self._pourings = [DensitySources(density, *make) for density in fluid.densities]
+        self.sources = [DensitySources(density, *make) for density in fluid.densities]
         self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
+        self._effort, self._gained_bar = effort, vector(self.layout, device, 2) if effort else ()
         self._lifted = field(self.layout, device) if self._lifts and gradients else None
         self._inner = InnerProduct(self.layout, device, 2)
         self._lay_out()
 
-    prescribed: float = 0.0
-    """Sum of the largest divergences that the last step's growths prescribe [1/s]."""
+    sources: list[DensitySources]
+    """What pours, density by density."""
     numbers: wp.array
     """All numbers of a step, on the device."""
     boxes: wp.array
@@ -70,9 +94,9 @@ class Forcing:
     def _lay_out(self) -> None:
         """Allocate the arrays, and tell everything what parts of them are its own."""
         self._groups = [*self._pushes, *self._growths]
-        blobs = [group.blobs for group in self._groups] + [p.blobs for p in self._pourings if p.blobs]
+        blobs = [group.blobs for group in self._groups] + [p.blobs for p in self.sources if p.blobs]
         impulses = len(self._fields) + 2 * len(self._lifts)
-        painted = sum(pouring.painted for pouring in self._pourings)
+        painted = sum(pouring.painted for pouring in self.sources)
         begin = _STEP + impulses + painted
         self.numbers, self.bars = (
             zeros(size, self.device)
@@ -85,7 +109,7 @@ class Forcing:
         self._impulses, self._impulses_bar = (entries(a, self._lone) for a in (self.numbers, self.bars))
         at = self._lone.stop
         self._painted: list[slice] = []
-        for pouring in self._pourings:
+        for pouring in self.sources:
             self._painted.append(slice(at, at + pouring.painted))
             if pouring.painted:
                 pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
@@ -131,11 +155,12 @@ class Forcing:
         until: float,
         kept: float = 0.0,
         live: bool = False,
-    ) -> None:
-        """Put a step on the device: what `row` finds."""
-        numbers, boxes = self.row(forces, fluid, t, dt, until, kept, live)
-        assign(numbers, self.numbers)
-        assign(boxes, self.boxes)
+    ) -> float:
+        """Put a step on the device: what `row` finds. Returns the divergence that is prescribed [1/s]."""
+        row = self.row(forces, fluid, t, dt, until, kept, live)
+        assign(row.numbers, self.numbers)
+        assign(row.boxes, self.boxes)
+        return row.prescribed
 
     def row(
         self,
@@ -146,8 +171,8 @@ class Forcing:
         until: float,
         kept: float = 0.0,
         live: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers and boxes of a step of dt, in which forces and the fluid's sources act from t to `until`.
+    ) -> ForcingRow:
+        """What is needed for a step of dt, in which forces and the fluid's sources act from t to `until`.
 
         `kept` is the part of the last step's pressure that is taken for a first guess; none where
         divergence is prescribed. With `live` forces count as acting even where their strengths are 0.
@@ -166,8 +191,8 @@ class Forcing:
                 )
             gained = max(blob.gained, abs(blob.swell) * blob.radius)
             _check(f"the force at {blob.center}", gained, t, until)
-        self.prescribed = sum(abs(blob.swell) for blob in blobs.values())
-        kept = 0.0 if self.prescribed else kept
+        prescribed = sum(abs(blob.swell) for blob in blobs.values())
+        kept = 0.0 if prescribed else kept
         hx, hy = self.grid.hx, self.grid.hy
         numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
         for n in dict.fromkeys(n for n, _ in self._fields):
@@ -178,7 +203,7 @@ class Forcing:
             impulse = forces[n].envelope.integral(t, until)
             _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
             numbers += [impulse * component for component in forces[n].vector]
-        pourings = list(zip(self._pourings, fluid.densities, strict=True))
+        pourings = list(zip(self.sources, fluid.densities, strict=True))
         for pouring, density in pourings:
             numbers += pouring.impulses(density, t, until)
         rows = []
@@ -187,10 +212,11 @@ class Forcing:
             rows.append(group.blobs.row([blobs[n] for n in group.members], alive))
         rows += [pouring.row(density, t, until, live) for pouring, density in pourings if pouring.blobs]
         boxes = [np.empty(0, dtype=np.int32), *(boxes for _, boxes in rows)]
-        return np.concatenate([numbers, *(row for row, _ in rows)]), np.concatenate(boxes)
+        numbers = np.concatenate([numbers, *(row for row, _ in rows)])
+        return ForcingRow(numbers, np.concatenate(boxes), prescribed)
 
     def push(self, state: State, out: Vector) -> None:
-        """out = the state's velocity and the forces' impulses, without ghosts: launches only."""
+        """out = the state's velocity and the forces' impulses, with ghosts: launches only."""
         for f, to in zip((state.u, state.v), out, strict=True):
             algebra.copy.launch(self.layout, self.device, [f], [to])
         impulses = iter(self._impulses)
@@ -202,6 +228,37 @@ class Forcing:
             forces.lift.launch(self.layout, self.device, inputs, [component])
         for pushes in self._pushes:
             pushes.add(out)
+        with together():
+            for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
+                ghosts.fill(f)
+        lifting = [state.rho[density] for _, density in self._lifts]
+        record(partial(self._push_back, state, out), [state.u, state.v, *lifting], out)
+
+    def _push_back(self, state: State, out: Vector) -> None:
+        """Add to the gradients of the state's velocity and densities; find those of the impulses."""
+        out_bar, velocity = bars(out), (state.u, state.v)
+        with together():
+            for f, to in zip(out_bar, bars(velocity), strict=True):
+                algebra.add.launch(self.layout, self.device, [f], [to])
+        gained_bar = out_bar
+        if self._effort:
+            gained_bar = self._gained_bar
+            for f_bar, after, before, to in zip(out_bar, out, velocity, gained_bar, strict=True):
+                inputs = [f_bar, after, before, self._effort]
+                forces_adjoint.effort_added.launch(self.layout, self.device, inputs, [to])
+        impulses_bar = iter(self._impulses_bar)
+        for _, fields in self._fields:
+            self._inner.dot(gained_bar, fields, next(impulses_bar))
+        for density, f_bar, before, impulse in self._lifting(gained_bar):
+            rho = state.rho[density]
+            forces_adjoint.mean_with_before.launch(self.layout, self.device, [rho, before], [self._lifted])
+            self._inner.dot([f_bar], [self._lifted], next(impulses_bar))
+            algebra.copy.launch(self.layout, self.device, [f_bar], [self._lifted])
+            self._velocity_ghosts[before > 1].fill(self._lifted)
+            inputs = [self._lifted, impulse, before, self.layout.nx]
+            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho.grad])
+        for pushes in self._pushes:
+            pushes.adjoint(gained_bar)
 
     def _lifting(self, velocity: Vector) -> list[tuple[int, wp.array, int, wp.array]]:
         """For each buoyancy and component: the density, the component, its stride and its impulse."""
@@ -217,37 +274,10 @@ class Forcing:
         for growths in self._growths:
             growths.add(b)
 
-    def pour(self, density: int, rho: wp.array) -> None:
-        """Add what its sources pour to a density, in place: launches only."""
-        self._pourings[density].add(rho)
-
-    def push_adjoint(self, velocity_bar: Vector, state: State, rho_bar: Sequence[wp.array]) -> None:
-        """The transpose of `push` with respect to impulses and densities: launches only.
-
-        `velocity_bar` comes with zeros for ghosts; what densities lifted is added to `rho_bar`.
-        """
-        bars = iter(self._impulses_bar)
-        for _, fields in self._fields:
-            self._inner.dot(velocity_bar, fields, next(bars))
-        for density, f_bar, before, impulse in self._lifting(velocity_bar):
-            inputs = [state.rho[density], before]
-            forces_adjoint.mean_with_before.launch(self.layout, self.device, inputs, [self._lifted])
-            self._inner.dot([f_bar], [self._lifted], next(bars))
-            algebra.copy.launch(self.layout, self.device, [f_bar], [self._lifted])
-            self._velocity_ghosts[before > 1].fill(self._lifted)
-            inputs = [self._lifted, impulse, before, self.layout.nx]
-            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho_bar[density]])
-        for pushes in self._pushes:
-            pushes.adjoint(velocity_bar)
-
     def prescribe_adjoint(self, minus_b_bar: wp.array) -> None:
         """The transpose of `prescribe`, from minus the gradient: launches only."""
         for growths in self._growths:
             growths.adjoint(minus_b_bar)
-
-    def pour_adjoint(self, density: int, rho_bar: wp.array) -> None:
-        """The transpose of `pour` with respect to the sources: launches only."""
-        self._pourings[density].adjoint(rho_bar)
 
     def gradients(self, numbers: np.ndarray, bars: np.ndarray) -> dict[int, np.ndarray]:
         """The gradients with respect to what each force does, from rows of `numbers` and `bars`, one a step.
@@ -269,7 +299,7 @@ class Forcing:
     def source_gradients(self, numbers: np.ndarray, bars: np.ndarray) -> list[dict[int, np.ndarray]]:
         """The same for the sources of each density."""
         found = []
-        for pouring, painted in zip(self._pourings, self._painted, strict=True):
+        for pouring, painted in zip(self.sources, self._painted, strict=True):
             own, moments = self._parts[id(pouring.blobs)] if pouring.blobs else (slice(0), slice(0))
             found.append(pouring.gradients(numbers[:, own], bars[:, moments], bars[:, painted]))
         return found

@@ -56,13 +56,13 @@ class Solver:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        self._stages = Step(grid, fluid, device)
-        self._last_dt = 0.0
+        self._step = Step(grid, fluid, device)
+        self._last_dt, self._prescribed = 0.0, 0.0
         self._preparation: CapturedGraph | None = None
-        self._impulses: dict[tuple, Forcing] = {}
-        self._last_impulses: Forcing | None = None
+        self._forcings: dict[tuple, Forcing] = {}
+        self._last_forcing: Forcing | None = None
         self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
-        self._pool = self._stages.helpers()
+        self._pool = self._step.helpers()
 
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
         """A new state: a still fluid under an untouched picture, with its densities as they begin.
@@ -77,8 +77,8 @@ class Solver:
             points.ndim != 2 or points.shape[1] != 2 or not np.all((points >= 0) & (points <= extent))
         ):
             raise ValueError("points: expected x, y within the picture for each")
-        state = State.at_rest(self.grid, self.device, len(self._stages.densities), len(points))
-        for density, rho in zip(self._stages.densities, state.rho, strict=True):
+        state = State.at_rest(self.grid, self.device, len(self._step.densities), len(points))
+        for density, rho in zip(self._step.densities, state.rho, strict=True):
             density.begin(rho)
         if points.size:
             assign(points[:, 0] / self.grid.hx, state.p_x)
@@ -88,7 +88,7 @@ class Solver:
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
         """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
         self._check(state)
-        for values, f, ghosts in zip((u, v), (state.u, state.v), self._stages.velocity_ghosts, strict=True):
+        for values, f, ghosts in zip((u, v), (state.u, state.v), self._step.velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
             ghosts.fill(f)
         fill(0.0, state.q)
@@ -97,7 +97,7 @@ class Solver:
         """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
         self._check(state)
         cells = displacement / (self.grid.hx, self.grid.hy)
-        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._stages.moved_ghosts, strict=True)):
+        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._step.moved_ghosts, strict=True)):
             from_numpy(cells[..., n], f, self.layout)
             ghosts.fill(f)
 
@@ -138,17 +138,17 @@ class Solver:
         until: float,
     ) -> CapturedGraph:
         """The step, captured at first, with its numbers put where it reads them."""
-        stages, impulses = self._stages, self._impulses_for(forces)
-        last = self._last_impulses
-        swelled = last is not None and last.prescribed > 0
-        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, swelled))
-        self._last_impulses, self._last_dt = impulses, dt
-        plan = stages.plan(until, dt, self._prepare)
-        key = (id(state_in), id(state_out), id(impulses), plan)
+        step, forcing = self._step, self._forcing_for(forces)
+        swelled = self._prescribed > 0
+        kept = step.kept(dt, self._last_dt, swelled)
+        self._prescribed = forcing.set(forces, self.fluid, t, dt, until, kept)
+        self._last_forcing, self._last_dt = forcing, dt
+        plan = step.plan(until, dt, self._prepare)
+        key = (id(state_in), id(state_out), id(forcing), plan)
         if key not in self._replays:
-            work = partial(stages.advance, state_in, state_out, impulses)
+            work = partial(step.advance, state_in, state_out, forcing)
             replay = CapturedGraph(self.device, work, self._pool)
-            self._replays[key] = (replay, state_in, state_out, impulses)
+            self._replays[key] = (replay, state_in, state_out, forcing)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
         self._replays[key] = self._replays.pop(key)  # the newest last
@@ -157,17 +157,15 @@ class Solver:
     def _prepare(self) -> None:
         """Bring what depends on the medium up to date."""
         if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self._stages.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self._step.follow_medium, self._pool)
         self._preparation.launch()
 
     def report(self) -> SolveReport:
         """Measure what the last step's solves left: true residuals and the divergence."""
-        stages = self._stages
-        pressure, divergence = stages.projection.measure()
-        prescribed, removed = 0.0, 0.0
-        if self._last_impulses:
-            prescribed, removed = self._last_impulses.prescribed, self._last_impulses.removed
-        return SolveReport(pressure, stages.diffusion.measure(), divergence, prescribed, removed)
+        step = self._step
+        pressure, divergence = step.projection.measure()
+        removed = self._last_forcing.removed if self._last_forcing else 0.0
+        return SolveReport(pressure, step.diffusion.measure(), divergence, self._prescribed, removed)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
@@ -175,46 +173,46 @@ class Solver:
         The velocity of `state_out` is untouched.
         """
         self._check(state_in, state_out)
-        impulses = self._impulses_for(())
-        impulses.set((), self.fluid, 0.0, dt, dt)
-        self._stages.trace(state_in, impulses)
-        self._stages.carry_map(state_in, state_out)
+        forcing = self._forcing_for(())
+        forcing.set((), self.fluid, 0.0, dt, dt)
+        foot = self._step.trace(state_in, forcing)
+        self._step.carry_map(state_in, foot, state_out)
 
     def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
         """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
-        stages = self._ready(state_in, t + dt, dt)
-        for f, out in zip(stages.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
+        step = self._ready(state_in, t + dt, dt)
+        for f, out in zip(step.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
             copy(f, out)
 
     def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
         """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
         self._check(state_in, state_out)
-        stages = self._ready(state_in, 0.0, dt)
-        stages.project((state_in.u, state_in.v), (state_out.u, state_out.v))
+        step = self._ready(state_in, 0.0, dt)
+        step.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
     def _ready(self, state: State, t: float, dt: float) -> Step:
-        """The stages, ready for one of them alone."""
-        self._stages.plan(t, dt, self._prepare)
+        """The step, ready for one of its stages alone."""
+        self._step.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
-            self._stages.follow_medium(state)
-        return self._stages
+            self._step.follow_medium(state)
+        return self._step
 
     def _check(self, *states: State) -> None:
         """Refuse states whose arrays are not this solver's size, or not on its device."""
         for state in states:
             if state.grid != self.grid or state.u.device != self.device:
                 raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
-            if len(state.rho) != len(self._stages.densities) or len(state.p_x) != len(states[0].p_x):
+            if len(state.rho) != len(self._step.densities) or len(state.p_x) != len(states[0].p_x):
                 raise ValueError(
                     f"a state with {len(state.rho)} densities and {len(state.p_x)} points: expected "
-                    f"{len(self._stages.densities)} and {len(states[0].p_x)}"
+                    f"{len(self._step.densities)} and {len(states[0].p_x)}"
                 )
 
-    def _impulses_for(self, forces: Sequence[Force]) -> Forcing:
+    def _forcing_for(self, forces: Sequence[Force]) -> Forcing:
         key = Forcing.key(forces)
-        if key not in self._impulses:
-            if len(self._impulses) >= REPLAYS_KEPT:
-                del self._impulses[next(iter(self._impulses))]
-            self._impulses[key] = Forcing(forces, self.fluid, self.grid, self.device)
-        return self._impulses[key]
+        if key not in self._forcings:
+            if len(self._forcings) >= REPLAYS_KEPT:
+                del self._forcings[next(iter(self._forcings))]
+            self._forcings[key] = Forcing(forces, self.fluid, self.grid, self.device)
+        return self._forcings[key]

@@ -20,18 +20,22 @@ from functools import partial
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Vector, vector, where
+from wfluid.fields.arrays import Vector, fill, vector, where
+from wfluid.fields.device import load_kernels
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
 from wfluid.kernels.cell.layout import Layout
-from wfluid.kernels.cell.strips import together
-from wfluid.kernels.step import advection, projection, transport
+from wfluid.kernels.cell.program import ADJOINT
+from wfluid.kernels.cell.strips import alone
 from wfluid.model.fluid import Fluid
+from wfluid.step.advection import Advection
 from wfluid.step.coefficients import Coefficients
 from wfluid.step.densities import DensityTransport
 from wfluid.step.diffusion import CoupledDiffusion, SeparateDiffusion
+from wfluid.step.feet import Feet
 from wfluid.step.forcing import Forcing
 from wfluid.step.projection import Projection
+from wfluid.step.tape import attach_gradients, bars, record
 from wfluid.system.threads import ThreadTeam, free_cores, helpers
 
 STEP_THREADS = 2
@@ -50,6 +54,12 @@ COUPLED_WORK = 4
 class Step:
     """A step's stages and what they work with. They only launch, so that a graph may capture them.
 
+    On the tape that is recording each stage leaves its transpose (`tape`). A step so recorded may be gone
+    back through later, after others: `recompute` finds again what the transposes read, and
+    `tape.backward()` goes from the gradients of the state after it to those of the state before it, of the
+    forces and of the viscosity. A linear solve with a symmetric solver is its own transpose, so that none
+    of its sweeps or iterates is recorded; conjugate gradients are so only up to their tolerance.
+
     Conjugate gradients go to the fluid's tolerances, or to `jump_tolerance` where that is lower.
     """
 
@@ -65,6 +75,9 @@ class Step:
             for rules in (walls.displacement_x_rules(), walls.displacement_y_rules())
         ]
         self.where = where(grid, walls, self.layout)
+        self.feet, self.advection = (
+            kind(grid, fluid, device, self.velocity_ghosts, self.moved_ghosts) for kind in (Feet, Advection)
+        )
         self.medium = None if fluid.separable else Coefficients(grid, fluid, device)
         self.diffusion = (
             CoupledDiffusion(fluid, self.medium, device, jump_tolerance)
@@ -72,32 +85,77 @@ class Step:
             else SeparateDiffusion(grid, fluid, device)
         )
         resisting = self.medium if fluid.freeze else None
-        self.projection = Projection(grid, fluid, resisting, device, jump_tolerance)
+        self.projection = Projection(grid, fluid, resisting, device, self.velocity_ghosts, jump_tolerance)
         self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
-        self.foot = vector(self.layout, device, 2)
-        self.pushed, self._carried = (vector(self.layout, device, 2) for _ in range(2))
+        self.pushed = vector(self.layout, device, 2)
         self._solves: tuple = ()
 
-    foot: Vector
-    """Of the last trace [cells], with ghosts."""
     pushed: Vector
-    """The velocity after forces, with ghosts; later without the pressure so far."""
+    """The velocity after the forces of the last step that had any, with ghosts."""
 
-    def advance(self, state_in: State, state_out: State, impulses: Forcing) -> None:
-        """The step: launches only."""
+    def advance(self, state_in: State, state_out: State, forcing: Forcing) -> None:
+        """The step: launches only, recorded on the tape that is recording."""
         if self.fluid.viscosity_moves:
             self.follow_medium(state_in)
-        self.trace(state_in, impulses)
-        self.carry_map(state_in, state_out)
-        self.carry_densities(state_in, state_out, impulses)
-        self.carry_points(state_in, state_out, impulses)
-        velocity = self.push(state_in, impulses)
-        velocity = self.advect(velocity)
-        velocity = self.subtract_pressure(velocity, state_in, impulses)
-        velocity = self.diffuse(velocity)
-        self.project(velocity, (state_out.u, state_out.v), impulses.prescribe if impulses.swells else None)
+        self.carry_points(state_in, state_out, forcing)
+        foot = self.trace(state_in, forcing)
+        self.carry_densities(state_in, foot, forcing, state_out)
+        self.carry_map(state_in, foot, state_out)
+        velocity = self.viscous(state_in, foot, forcing)
+        self.project(velocity, (state_out.u, state_out.v), forcing)
         if self.medium:
-            self.projection.add_pressure(state_in.q, impulses.kept, state_out.q)
+            self.projection.add_pressure(state_in.q, forcing, state_out.q)
+        record(partial(self._clear_gradients, state_in), (), ())
+
+    def viscous(self, state: State, foot: Vector, forcing: Forcing) -> Vector:
+        """The velocity after forces, advection and diffusion, with ghosts."""
+        velocity = self.push(state, forcing)
+        velocity = self.advect(velocity, foot)
+        if self.medium:
+            velocity = self.projection.subtract_pressure(velocity, state.q, forcing)
+        return self.diffuse(velocity)
+
+    def recompute(self, state: State, forcing: Forcing) -> None:
+        """Find again what the transposes of the step from `state` read, beside `state`: launches only.
+
+        No solve, unless the gradient with respect to viscosity is wanted, which reads the velocity diffused.
+        """
+        if self.fluid.viscosity_moves:
+            self.follow_medium(state)
+        foot = self.trace(state, forcing)
+        if self._of_viscosity:
+            self.viscous(state, foot, forcing)
+        else:
+            self.push(state, forcing)
+
+    def allow_gradients(self, of_viscosity: bool = False) -> None:
+        """Allocate what the transposes need, unless it is there, and load their kernels.
+
+        With `of_viscosity` the gradient with respect to viscosity is found as well, which is right only as
+        far as the diffusion is solved. A viscosity that moves needs it in any case.
+        """
+        load_kernels(self.device, ADJOINT)
+        self._of_viscosity = of_viscosity or self.fluid.viscosity_moves
+        self.diffusion.allow_gradients(self._of_viscosity)
+        if self.pushed[0].grad is not None:
+            return  # captured graphs know the arrays by their addresses
+        attach_gradients(self.pushed, self.layout)
+        if self.medium:
+            self.medium.allow_gradients()
+        for stage in (self.feet, self.advection, self.projection, *self.densities):
+            stage.allow_gradients()
+
+    def _clear_gradients(self, state: State) -> None:
+        """Let the gradients that several stages add to begin at 0; the first thing on the way back."""
+        added = [*state.arrays, *self.pushed, *self.feet.foot]
+        if self.fluid.viscosity_moves:
+            added.append(self.medium.levels[0].mu)
+        alone(lambda: fill(0.0, *bars(added)))
+
+    @property
+    def mu_bar(self) -> wp.array:
+        """The gradient with respect to the painted viscosity, at centres, which every step adds to."""
+        return self.medium.painted_mu.grad if self.medium else self.diffusion.mu_bar
 
     def take_fluid(self, fluid: Fluid) -> None:
         """Go on with a fluid that differs in the values of its viscosity, not in their kind."""
@@ -119,14 +177,14 @@ class Step:
         return helpers(STEP_THREADS if shared else 1)
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
-        """Make ready for a step of dt that ends at t; how its solves will go.
+        """Make ready for a step of dt that ends at t; the methods of its solves.
 
         `prepare` is called where what `follow_medium` computes is out of date.
         """
         densities = tuple(density.plan(dt) for density in self.densities)
         medium = self.medium
         if not medium:
-            return self.diffusion.plan(dt), self.projection.how, *densities
+            return self.diffusion.plan(dt), self.projection.method, *densities
         if medium.set_time(t, dt):
             try:
                 self._solves = self.diffusion.plan(dt), self.projection.plan(dt)
@@ -151,7 +209,7 @@ class Step:
     def expect(self, times: Sequence[float], dt: float) -> tuple:
         """Make ready for steps of dt that end at these times, in a viscosity that depends on them.
 
-        Only how the solves go is known then: each step must take its viscosity, and `follow_medium`.
+        Only the methods of the solves are known then: each step must take its viscosity, and `follow_medium`.
         """
         self.medium.bound_over(times, dt)
         return self.diffusion.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
@@ -165,88 +223,41 @@ class Step:
         if self.fluid.freeze:
             self.projection.prepare()
 
-    def trace(self, state: State, impulses: Forcing) -> None:
-        """Find the feet of all centres."""
-        trace = advection.trace_euler if self.fluid.scheme == "paper" else advection.trace_midpoint
-        inputs = [state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
-        trace.launch(self.layout, self.device, inputs, self.foot)
-        with together():
-            for f, ghosts in zip(self.foot, self.moved_ghosts, strict=True):
-                ghosts.fill(f)
+    def trace(self, state: State, forcing: Forcing) -> Vector:
+        """The feet of all centres [cells], with ghosts."""
+        return self.feet.trace((state.u, state.v), forcing)
 
-    def push(self, state: State, impulses: Forcing) -> Vector:
-        """The velocity after forces, with ghosts."""
-        if not impulses.pushes:
-            return state.u, state.v
-        impulses.push(state, self.pushed)
-        self.fill(self.pushed)
-        return self.pushed
-
-    def carry_map(self, state_in: State, state_out: State) -> None:
-        """The displacement a step later."""
-        paper = self.fluid.scheme == "paper"
-        carry = transport.carry_map_bilinear if paper else transport.carry_map_cubic
-        inputs = [state_in.d_x, state_in.d_y, *self.foot, *self.where]
-        carry.launch(self.layout, self.device, inputs, [state_out.d_x, state_out.d_y])
-        with together():
-            for d, ghosts in zip((state_out.d_x, state_out.d_y), self.moved_ghosts, strict=True):
-                ghosts.fill(d)
-
-    def carry_densities(self, state_in: State, state_out: State, impulses: Forcing) -> None:
-        """The densities a step later, with what their sources pour."""
-        for n, (density, rho) in enumerate(zip(self.densities, state_in.rho, strict=True)):
-            density.advance(rho, self.foot, self.where, partial(impulses.pour, n), state_out.rho[n])
-
-    def carry_points(self, state_in: State, state_out: State, impulses: Forcing) -> None:
+    def carry_points(self, state_in: State, state_out: State, forcing: Forcing) -> None:
         """The points a step later."""
-        state = state_in
-        inputs = [state.p_x, state.p_y, state.u, state.v, impulses.dt_hx, impulses.dt_hy, *self.where]
-        out = [state_out.p_x, state_out.p_y]
-        transport.carry_points.launch(len(state.p_x), self.device, inputs, out)
+        points, out = (state_in.p_x, state_in.p_y), (state_out.p_x, state_out.p_y)
+        self.feet.carry_points(points, (state_in.u, state_in.v), forcing, out)
 
-    def advect(self, velocity: Vector) -> Vector:
-        """The velocity carried along the flow, with ghosts."""
-        paper = self.fluid.scheme == "paper"
-        advect = advection.advect_face_bilinear if paper else advection.advect_face_cubic
-        with together():
-            for f, before, carried in zip(velocity, (1, self.layout.pitch), self._carried, strict=True):
-                inputs = [f, *self.foot, before, *self.where]
-                advect.launch(self.layout, self.device, inputs, [carried])
-        self.fill(self._carried)
-        return self._carried
+    def carry_map(self, state_in: State, foot: Vector, state_out: State) -> None:
+        """The displacement a step later."""
+        d, out = (state_in.d_x, state_in.d_y), (state_out.d_x, state_out.d_y)
+        self.advection.carry_map(d, foot, out)
 
-    def subtract_pressure(self, velocity: Vector, state: State, impulses: Forcing) -> Vector:
-        """Without the gradient of the pressure so far, where diffusion and projection do not commute."""
-        if not self.medium:
-            return velocity
-        axes = ((1, impulses.kept_hx), (self.layout.pitch, impulses.kept_hy))
-        with together():
-            for f, (before, kept_h), pushed in zip(velocity, axes, self.pushed, strict=True):
-                projection.subtract_slope.launch(
-                    self.layout, self.device, [f, state.q, kept_h, before], [pushed]
-                )
-        self.fill(self.pushed)
+    def carry_densities(self, state_in: State, foot: Vector, forcing: Forcing, state_out: State) -> None:
+        """The densities a step later, with what their sources pour."""
+        stages = zip(self.densities, state_in.rho, forcing.sources, state_out.rho, strict=True)
+        for density, rho, sources, out in stages:
+            density.advance(rho, foot, self.where, sources, out)
+
+    def push(self, state: State, forcing: Forcing) -> Vector:
+        """The velocity after forces, with ghosts: the state's own where there are none."""
+        if not forcing.pushes:
+            return state.u, state.v
+        forcing.push(state, self.pushed)
         return self.pushed
+
+    def advect(self, velocity: Vector, foot: Vector) -> Vector:
+        """The velocity carried along the flow, with ghosts."""
+        return self.advection.carry_velocity(velocity, foot)
 
     def diffuse(self, velocity: Vector) -> Vector:
-        """The velocity after viscosity and drag, with ghosts."""
-        if not self.diffusion.how.iterations:
-            return velocity
-        self.diffusion.diffuse(velocity)
-        return self.diffusion.out
+        """The velocity after viscosity and drag, with ghosts; the same where there is neither."""
+        return self.diffusion.diffuse(velocity) if self.diffusion.method.iterations else velocity
 
-    def project(
-        self,
-        velocity: Vector,
-        out: Vector,
-        prescribe: Callable[[wp.array], None] | None = None,
-    ) -> None:
-        """The velocity without its divergence, with ghosts; `prescribe` adds to it what is to stay."""
-        self.projection.project(velocity, out, prescribe)
-        self.fill(out)
-
-    def fill(self, velocity: Vector) -> None:
-        """Fill the ghosts of a velocity, and zero its faces on walls."""
-        with together():
-            for f, ghosts in zip(velocity, self.velocity_ghosts, strict=True):
-                ghosts.fill(f)
+    def project(self, velocity: Vector, out: Vector, forcing: Forcing | None = None) -> None:
+        """The velocity without its divergence but for what is prescribed, with ghosts."""
+        self.projection.project(velocity, out, forcing if forcing and forcing.swells else None)

@@ -1,0 +1,31 @@
+"""Steps in a row, to and fro between two states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.state import State
+from wfluid.model.force import Force
+from wfluid.step.solver import Solver
+
+Advance = Callable[[State, State, int], None]
+"""Writes the state after a step: from the state before, to the state after, which step."""
+
+
+def march(now: State, spare: State, steps: Iterable[int], advance: Advance) -> Iterator[tuple[State, State]]:
+    """Take steps one after the other; after each, the fluid as it is and the state written over next."""
+    for step in steps:
+        advance(now, spare, step)
+        now, spare = spare, now
+        yield now, spare
+
+
+def steps_of(solver: Solver, timeline: Timeline, forces: Sequence[Force]) -> Advance:
+    """The steps of a timeline under forces, for `march`."""
+
+    def advance(state_in: State, state_out: State, step: int) -> None:
+        t, until = timeline.time_of(step), timeline.time_of(step + 1)
+        solver.step(state_in, state_out, forces, t, timeline.dt, until=until)
+
+    return advance
