@@ -25,7 +25,7 @@ from wfluid.kernels.step.interpolation import bilinear, cubic_slopes, cubic_weig
 
 @wp.func
 def moves_inside(offset: Real, i: int, n: int, periodic: int):
-    """1 where `kept_inside` follows the offset, 0 where a wall stops it."""
+    """Derivative of the offset that `kept_inside` takes: 1, or 0 where a wall limits it."""
     return wp.where(kept_inside(offset, i, n, periodic) == offset, Real(1.0), Real(0.0))
 
 
@@ -133,9 +133,10 @@ def add_feet_of_faces(
     # outputs
     foot_bar: Field,
 ):
-    """Add to the gradient of one axis of the foot of centre k that of the feet of the faces around it.
+    """foot_bar += (of_u[k] + of_u[k + 1] + of_v[k] + of_v[k + pitch]) / 2 at centre k, in place.
 
-    Faces took the mean of the two feet beside them.
+    All are for one axis: of_u and of_v are the gradients [1/cells] with respect to the feet of faces, each of
+    which is the mean of the feet of two centres.
     """
     k = inside(k)
     south = inside(k + pitch)
@@ -153,9 +154,10 @@ def add_feet_of_centres(
     # outputs
     foot_bar: Field,
 ):
-    """Add to the gradient of one axis of the foot of centre k that of the displacement carried from it.
+    """foot_bar += of_d_x + of_d_y + d_bar at centre k, in place, for one axis [1/cells].
 
-    Of the displacement along that axis the foot is also a summand.
+    of_d_x and of_d_y come from the displacement at the foot; d_bar is the gradient with respect to the
+    displacement along the axis, to which the foot is added.
     """
     k = inside(k)
     foot_bar[k] = foot_bar[k] + of_d_x[k] + of_d_y[k] + d_bar[k]
