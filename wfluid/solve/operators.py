@@ -34,7 +34,7 @@ The least one measured is 0.78 for constant viscosity, 0.72 at a contrast of 50.
 
 
 class FivePoint(Level):
-    """A = shift - scale Lap with constant coefficients, of one component.
+    """The operator A = shift - scale Lap with constant coefficients, of one component.
 
     Diffusion has shift 1 and scale dt mu, pressure without drag shift 0 and scale 1.
     """
@@ -97,7 +97,7 @@ class FivePoint(Level):
 
 
 class VariablePoisson(Level):
-    """A q = -div (beta grad q) with beta on the faces: pressure with drag."""
+    """The operator A q = -div (beta grad q) with beta on the faces: pressure with drag."""
 
     def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
@@ -127,7 +127,7 @@ class VariablePoisson(Level):
 
 
 class ViscousStress(Level):
-    """A v = v + dt alpha v - dt div (mu (grad v + grad v^T)): variable viscosity and drag, u with v."""
+    """The operator A v = v + dt alpha v - dt div (mu (grad v + grad v^T)), which couples u and v."""
 
     def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
