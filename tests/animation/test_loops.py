@@ -5,7 +5,8 @@ import pytest
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import fit_to_loop, fitted_period, frames_of, starting_impulses
-from wfluid.domain.envelopes import Constant, Fade, Oscillator
+from wfluid.domain.envelopes import Constant, Fade
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.timeline import Timeline
 from wfluid.model.densities import Density, Source
 from wfluid.model.fluid import Fluid

@@ -77,8 +77,8 @@ def test_keys_may_jump_nearly_and_name_the_ends():
         ({1.0: -0.1}, "values 0 … 1"),
         ({1.0: float("nan")}, "values 0 … 1"),
         ({float("nan"): 0.5}, "expected times within the morph"),
-        ({0.0: 0.5}, "it begins with 0 and ends with 1"),
-        ({2.0: 0.5}, "it begins with 0 and ends with 1"),
+        ({0.0: 0.5}, "expected 0 at the start and 1 at the end"),
+        ({2.0: 0.5}, "expected 0 at the start and 1 at the end"),
     ],
 )
 def test_what_is_no_curve_is_refused(what, says):

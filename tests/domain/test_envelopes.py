@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wfluid.domain.envelopes import Arbitrary, Constant, Fade, Instantaneous, Oscillator, product
+from wfluid.domain.envelopes import Arbitrary, Constant, Fade, Instantaneous, product
+from wfluid.domain.oscillator import Oscillator
 
 ENVELOPES = {
     "constant": Constant(0.2, 1.3),

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, Instantaneous, Oscillator, Product
+from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, Instantaneous, Product
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.paths import Path
 from wfluid.model.densities import PaintedSource, Source
 from wfluid.model.force import GaussianImpulse

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from oracles import divergence
 
-from wfluid.domain.envelopes import Arbitrary, Constant, Fade, Instantaneous, Oscillator
+from wfluid.domain.envelopes import Arbitrary, Constant, Fade, Instantaneous
 from wfluid.domain.grid import Grid
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.paths import Path
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import to_numpy

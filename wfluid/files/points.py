@@ -30,7 +30,7 @@ class PointRow:
     target: tuple[float, float]
     """Its destination, x and y [px]."""
     time: float | None
-    """Time of arrival [s], after 0; None where the file has none."""
+    """Time of arrival [s], after 0; None if the row has none."""
 
 
 def read_points(path: str | os.PathLike) -> list[PointRow]:
@@ -40,7 +40,7 @@ def read_points(path: str | os.PathLike) -> list[PointRow]:
     that begin with # are skipped. Points are not compared with the size of a picture.
 
     Raises:
-        FileError: a file that is missing, no text or has no points; or an invalid line, with its number.
+        FileError: a file that is missing, is no text or has no points; or an invalid line, with its number.
     """
     path, found = Path(path), []
     names: Sequence[str] | None = None
