@@ -9,7 +9,7 @@ from wfluid.animation.animation import Animation
 from wfluid.cli.flags import add_key_flags
 from wfluid.cli.options import given_keys
 from wfluid.cli.parser import build_parser
-from wfluid.domain.timeline import SCENE_FPS
+from wfluid.domain.limits import SCENE_FPS
 from wfluid.model.fluid import Fluid
 from wfluid.model.painted import Freeze
 from wfluid.morphing.settings import MorphSettings

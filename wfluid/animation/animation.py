@@ -11,9 +11,9 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
-from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS, Grid
-from wfluid.domain.limits import SIZE_LIMIT
-from wfluid.domain.timeline import FPS, Timeline
+from wfluid.domain.grid import Grid
+from wfluid.domain.limits import CELLS, CELLS_LIMIT, FPS, LEAST_CELLS, SIZE_LIMIT
+from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten

@@ -22,9 +22,9 @@ from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Envelope, Instantaneous, Product, product
+from wfluid.domain.limits import LOOPS
 from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.piecewise import ease
-from wfluid.domain.timeline import LOOPS
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import Growth
 from wfluid.model.noise_force import NoiseForce

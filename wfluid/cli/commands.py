@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
 
 
@@ -39,6 +38,8 @@ def run_check_gradient(options: argparse.Namespace) -> int:
     """Test the gradients of a scene; in a process of its own where this one is not in double precision."""
     double = {"WFLUID_PRECISION": "float64"}
     if os.environ.get("WFLUID_PRECISION") != double["WFLUID_PRECISION"]:
+        import subprocess
+
         command = [sys.executable, "-m", "wfluid", *options.arguments]
         return subprocess.call(command, env={**os.environ, **double})
     from wfluid.cli.check_gradient import check_gradient

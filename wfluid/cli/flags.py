@@ -6,12 +6,27 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wfluid.cli.options import DENSITIES, KEYFRAME_TIME, flag_name, force_flag
 from wfluid.cli.run_flags import add_plot, add_run, repeated
 from wfluid.scene.forces import FORCES
 from wfluid.scene.format import SCENE
 from wfluid.scene.schema import ArrayOf, Key, Table
 from wfluid.scene.short_forms import DENSITY_OPTIONS, FORMS, force_options
+
+KEYFRAME_TIME = 1.0
+"""Default time of the keyframes of `wfluid keyframes` [s]."""
+
+DENSITIES = ("ink", "smoke")
+"""Short forms of densities; the others are forces."""
+
+
+def flag_name(flag: str) -> str:
+    """The attribute of the parsed options that holds a flag's value."""
+    return flag.lstrip("-").replace("-", "_")
+
+
+def drawn_flag(kind: str) -> str:
+    """The flag of a short form: its kind, except for a force from a picture."""
+    return "--force-image" if kind == "image" else f"--{kind}"
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
@@ -99,13 +114,13 @@ def _add_forces(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("forces", "What moves the picture, places and lengths in pixels")
     for kind, (form, *_) in FORMS.items():
         if kind in DENSITIES:
-            meaning, keys, flag = f"pour {kind} of a colour", DENSITY_OPTIONS, f"--{kind}"
+            meaning, keys = f"pour {kind} of a colour", list(DENSITY_OPTIONS)
         else:
             table = FORCES.tables[kind]
             meaning = table.meaning[0].lower() + table.meaning[1:]
-            keys, flag = force_options(kind), force_flag(kind)
+            keys = force_options(kind)
         group.add_argument(
-            flag,
+            drawn_flag(kind),
             **repeated(f"{form}[:key=value,…]", f"{meaning}; keys {', '.join(keys)}".replace("%", "%%")),
         )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from wfluid.cli.flags import DENSITIES, KEYFRAME_TIME, drawn_flag, flag_name
 from wfluid.domain.limits import KEYFRAME_VISCOSITY
 from wfluid.files.names import numbering
 from wfluid.files.points import read_points
@@ -14,12 +15,6 @@ from wfluid.scene.format import SCENE, VERSION
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import ArrayOf, Key, Table
 from wfluid.scene.short_forms import FORMS, as_pair, parse_density, parse_move, read_force
-
-KEYFRAME_TIME = 1.0
-"""When points arrive that no time is given for [s]."""
-
-DENSITIES = ("ink", "smoke")
-"""Short forms that pour a density; the others are forces."""
 
 
 def scene_of_options(options: argparse.Namespace) -> Scene:
@@ -55,16 +50,6 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
     tables["output"] = _outputs(options)
     given = {key: value for key, value in tables.items() if value}
     return Scene(given, source="command line", flags={**dict(_flags(SCENE, given)), **flags})
-
-
-def flag_name(flag: str) -> str:
-    """The attribute of parsed options that holds a flag's value."""
-    return flag.lstrip("-").replace("-", "_")
-
-
-def force_flag(kind: str) -> str:
-    """The flag of a kind of force: its name, but for a force from a picture."""
-    return "--force-image" if kind == "image" else f"--{kind}"
 
 
 def _flags(what: Any, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, str]]:
@@ -111,7 +96,7 @@ def _add_drawn(options: argparse.Namespace, tables: dict[str, Any], flags: dict[
     """Add the forces and densities of short forms, and the flag that each comes from."""
     forces, densities = tables["force"], tables["density"]
     for kind in FORMS:
-        flag = f"--{kind}" if kind in DENSITIES else force_flag(kind)
+        flag = drawn_flag(kind)
         for text in _several(options, flag_name(flag)):
             if kind in DENSITIES:
                 density, force = parse_density(kind, text, f"{kind} {len(densities) + 1}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
 from typing import NoReturn
 
@@ -59,18 +58,22 @@ class Parser(argparse.ArgumentParser):
             flag = word.partition("=")[0]
             if not flag.startswith("-"):
                 self.error(f"{word!r} is one argument too many")
-            near = difflib.get_close_matches(flag, self._option_string_actions, n=1, cutoff=0.5)
-            self.error(f"there is no flag {flag}" + (f"; did you mean {near[0]}?" if near else ""))
+            self.error(f"there is no flag {flag}{_nearest(flag, list(self._option_string_actions))}")
         return options, unknown
 
     def error(self, message: str) -> NoReturn:
         """Print the message and leave with exit code 2."""
         wrong = re.match(r"argument VERB: invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if wrong:
-            near = difflib.get_close_matches(wrong[1], re.findall(r"\w+", wrong[2]), n=1)
-            ask = f"did you mean {near[0]}?" if near else f"expected {wrong[2]}"
-            message = f"there is no verb {wrong[1]!r}; {ask}"
+            near = _nearest(wrong[1], list(HELP)) or f"; expected {wrong[2]}"
+            message = f"there is no verb {wrong[1]!r}{near}"
         self.exit(Exit.INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def _nearest(word: str, known: list[str]) -> str:
+    from wfluid.scene.types import nearest
+
+    return nearest(word, known)
 
 
 class Version(argparse.Action):

@@ -5,11 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-LEAST_CELLS = 4
-"""Smallest number of cells along an axis: the width of a cubic stencil."""
-
-CELLS, CELLS_LIMIT = 256, 8192
-"""Default and largest number of cells along the longer side; the limit keeps 32-bit indices in range."""
+from wfluid.domain.limits import CELLS, LEAST_CELLS
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,43 @@
 """Choices, limits and defaults shared by the library, scenes and the command line. Loads no numpy.
 
-Constants of time are in `timeline`, constants of the grid in `grid`, boundary conditions in `walls`.
+The command line shows them as defaults, so this file imports nothing.
 """
 
 from __future__ import annotations
+
+# Grid and walls
+
+LEAST_CELLS = 4
+"""Cells along an axis below which a cubic stencil no longer fits."""
+
+CELLS, CELLS_LIMIT = 256, 8192
+"""Default number of cells along the longer side, and the largest: indices are 32-bit."""
+
+WALLS = ("free-slip", "no-slip", "periodic")
+"""Boundary conditions of an axis."""
+
+# Time
+
+STEPS_PER_SECOND = 96
+"""Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
+
+KEYFRAME_STEPS = 48
+"""Default steps a second, at least, of a scene with keyframes."""
+
+FPS = 24.0
+"""Default frame rate of a `Timeline`, and of `animate` [1/s]: the cinema's."""
+
+SCENE_FPS = 15.0
+"""Default frame rate of scenes and command lines [1/s]: the size of a GIF grows with every frame."""
+
+LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
+"""Smallest and largest frame rate [1/s]."""
+
+SUBSTEPS_LIMIT = 100_000
+"""Most steps a frame that a scene may ask for."""
+
+LOOPS = ("oscillate", "pingpong", "crossfade")
+"""Ways to close a loop."""
 
 # Fluid
 
@@ -68,7 +102,16 @@ LEAST_TIME = 0.001
 AMOUNT_LIMIT = 1000.0
 """Largest density that a source may add or a picture may paint."""
 
-# Frames
+# Pictures and frames
+
+COLORSPACES = ("auto", "srgb", "linear", "data")
+"""Colour spaces of a picture's numbers."""
+
+TYPES = ("uint8", "uint16", "half", "float")
+"""Number types a picture is written with."""
+
+QUALITY_LIMIT = 100
+"""Best quality of a lossy format; 1 is the poorest."""
 
 SIZE_LIMIT = 32768
 """Longest side of a frame [px]."""

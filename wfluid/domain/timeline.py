@@ -6,26 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-STEPS_PER_SECOND = 96
-"""Default number of steps per second: a step of 1/96 s keeps the splitting error small."""
-
-KEYFRAME_STEPS = 48
-"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
-
-FPS = 24.0
-"""Default frame rate of `Timeline` and `animate` [1/s]: that of cinema."""
-
-SCENE_FPS = 15.0
-"""Default frame rate of scenes and the command line [1/s]: GIF files grow with every frame."""
-
-LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
-"""Smallest and largest frame rate [1/s]."""
+from wfluid.domain.limits import FPS, FPS_LIMIT, LEAST_FPS, STEPS_PER_SECOND
 
 FRAME_LIMIT = 100_000
 """Largest number of frames of an animation."""
-
-SUBSTEPS_LIMIT = 100_000
-"""Largest number of steps per frame in a scene."""
 
 MOST_FACTOR = 8
 """Largest factor by which `substeps_for` raises the number of steps per frame."""
@@ -110,5 +94,3 @@ class Timeline:
 
 STEP_LIMIT = 10.0
 """Largest step that the solver is tested with [s]."""
-
-LOOPS = ("oscillate", "pingpong", "crossfade")

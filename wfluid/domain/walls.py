@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from wfluid.domain.limits import WALLS
+
 
 class Wall(Enum):
     """Boundary condition at both edges of an axis."""
 
-    FREE_SLIP = "free-slip"
+    FREE_SLIP = WALLS[0]
     """No flow through the wall; the fluid slides along it without friction."""
-    NO_SLIP = "no-slip"
+    NO_SLIP = WALLS[1]
     """No velocity at the wall, so that the border of the picture stays in place."""
-    PERIODIC = "periodic"
+    PERIODIC = WALLS[2]
     """The two edges are joined, for tileable pictures."""
 
 

@@ -6,12 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wfluid.domain.checks import check_word
+from wfluid.domain.limits import QUALITY_LIMIT, TYPES
 from wfluid.system.errors import FileError
-
-COLORSPACES = ("auto", "srgb", "linear", "data")
-
-TYPES = ("uint8", "uint16", "half", "float")
-"""Number types a picture is written with."""
 
 LARGEST = 65504.0
 """Largest number of type half. It replaces infinite values on reading, which filters would turn into NaN."""
@@ -40,8 +36,6 @@ _COMPRESSIONS = {
     ".tif": ("none", "lzw", "zip", "packbits"),
     ".tiff": ("none", "lzw", "zip", "packbits"),
 }
-QUALITY_LIMIT = 100
-"""Best quality of a lossy format; 1 is the poorest."""
 
 QUALITIES = {".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp"}
 

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.domain.checks import check_word
+from wfluid.domain.limits import COLORSPACES, TYPES
 from wfluid.pictures import color
 from wfluid.pictures.formats import (
     CHANNELS,
-    COLORSPACES,
     LARGEST,
     LINEAR,
     QUALITIES,
-    TYPES,
     WRITES,
     Encoding,
     PictureError,

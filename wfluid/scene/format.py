@@ -6,36 +6,40 @@ A field is everything that there is to say of a key: the reader, its refusals, t
 
 from __future__ import annotations
 
-from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS
+from typing import TYPE_CHECKING
+
 from wfluid.domain.limits import (
     AMOUNT_LIMIT,
+    CELLS,
+    CELLS_LIMIT,
+    COLORSPACES,
     CYCLES,
     CYCLES_LIMIT,
     DRAG,
     DRAG_LIMIT,
     FIRST_FRAME,
+    FPS_LIMIT,
     INK_CODE,
+    KEYFRAME_STEPS,
     KEYFRAME_VISCOSITY,
+    LEAST_CELLS,
+    LEAST_FPS,
     LOOKS,
+    LOOPS,
     MORPH_VISCOSITY,
     PAINTED_VISCOSITY,
+    QUALITY_LIMIT,
+    SCENE_FPS,
     SCHEMES,
     SIZE_LIMIT,
     SOLVERS,
-    VISCOSITY,
-    VISCOSITY_LIMIT,
-)
-from wfluid.domain.timeline import (
-    FPS_LIMIT,
-    KEYFRAME_STEPS,
-    LEAST_FPS,
-    LOOPS,
-    SCENE_FPS,
     STEPS_PER_SECOND,
     SUBSTEPS_LIMIT,
+    TYPES,
+    VISCOSITY,
+    VISCOSITY_LIMIT,
+    WALLS,
 )
-from wfluid.domain.walls import Wall
-from wfluid.pictures.formats import COLORSPACES, QUALITY_LIMIT, TYPES, Encoding
 from wfluid.pictures.sampling import EDGE, EDGES, FILTER, FILTERS
 from wfluid.scene.forces import (
     ENVELOPES,
@@ -55,6 +59,9 @@ from wfluid.scene.forces import (
 from wfluid.scene.keyframes import KeyframesTable, MorphTable
 from wfluid.scene.schema import SceneTable, array, file_key, key, mapping, optional, table, table_of
 from wfluid.scene.types import color, flag, names, number, text, version, whole, word
+
+if TYPE_CHECKING:
+    from wfluid.pictures.formats import Encoding
 
 VERSION = 1
 """Of the format that this file describes."""
@@ -92,9 +99,9 @@ class FluidTable(SceneTable):
         "cells along the longer side", whole(LEAST_CELLS, CELLS_LIMIT), default=CELLS, flag="--cells"
     )
     walls: str = key(
-        f"{', '.join(wall.value for wall in Wall)}, or two of them as x,y",
+        f"{', '.join(WALLS)}, or two of them as x,y",
         text(),
-        default=Wall.FREE_SLIP.value,
+        default=WALLS[0],
         flag="--walls",
     )
     scheme: str = key(
@@ -280,6 +287,8 @@ class OutputTable(SceneTable):
         Raises:
             PictureError: a value that no format has.
         """
+        from wfluid.pictures.formats import Encoding
+
         return Encoding(self.type, self.compression, self.quality)
 
 

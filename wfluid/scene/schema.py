@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, ClassVar, dataclass_transform
+from typing import Any, ClassVar, NamedTuple, dataclass_transform
 
 from wfluid.scene.types import Type, text
 from wfluid.system.errors import FileError
@@ -61,8 +60,7 @@ def blame(*path: str | int, file: str = "") -> Iterator[None]:
 # What a scene may say
 
 
-@dataclass(frozen=True)
-class Key:
+class Key(NamedTuple):
     """One value."""
 
     meaning: str
@@ -106,8 +104,7 @@ class Key:
         return self.default if isinstance(self.default, str) else f"{self.default:g}"
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Keys and tables by name."""
 
     meaning: str
@@ -122,8 +119,7 @@ class Table:
     """Why a morph has no use for a key, by key."""
 
 
-@dataclass(frozen=True)
-class ArrayOf:
+class ArrayOf(NamedTuple):
     """An array of tables."""
 
     each: Table | Union
@@ -132,16 +128,14 @@ class ArrayOf:
     """A key whose values must differ."""
 
 
-@dataclass(frozen=True)
-class MapOf:
+class MapOf(NamedTuple):
     """Tables under names of the user's choice."""
 
     each: Table | Union
     """What each is."""
 
 
-@dataclass(frozen=True)
-class Union:
+class Union(NamedTuple):
     """A table whose key `kind` says which."""
 
     meaning: str
@@ -156,8 +150,7 @@ Part = Key | Table | ArrayOf | MapOf | Union
 # Tables as classes
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """What a class of tables says of one of its attributes."""
 
     what: Part

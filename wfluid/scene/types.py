@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 LARGEST = sys.float_info.max
 """Largest number: TOML's integers may be larger."""
 
 
-@dataclass(frozen=True)
-class Type:
+class Type(NamedTuple):
     """What a value may be."""
 
     check: Callable[[Any], Any]
@@ -191,5 +188,7 @@ def as_number(name: str, part: str) -> float:
 
 def nearest(value: Any, known: Sequence[str]) -> str:
     """Ask for the most similar of what is known, if there is one."""
+    import difflib  # only for messages: every start of the command line loads this file
+
     near = difflib.get_close_matches(str(value), list(known), n=1, cutoff=0.5)
     return f"; did you mean {near[0]}?" if near else ""

@@ -9,9 +9,9 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import check_loop
 from wfluid.domain.envelopes import Constant, product
-from wfluid.domain.limits import INK, MORPH_TOLERANCE, MORPH_VISCOSITY, TOLERANCE, VISCOSITY
+from wfluid.domain.limits import INK, KEYFRAME_STEPS, MORPH_TOLERANCE, MORPH_VISCOSITY, TOLERANCE, VISCOSITY
 from wfluid.domain.paths import Place
-from wfluid.domain.timeline import KEYFRAME_STEPS, substeps_for
+from wfluid.domain.timeline import substeps_for
 from wfluid.files.points import read_points
 from wfluid.keyframes.keyframes import ParticleKeyframe, targets_of
 from wfluid.model.densities import Density, PaintedSource, Source

@@ -222,7 +222,7 @@ class CoupledDiffusion:
                 algebra.multiply.launch(self.layout, self.device, [f, beta], [start])
         top.fill(self._start)
         top.residual(velocity, self._start, self._change)
-        self.system.solve(self.method, self._change, self._answer, whole=velocity)
+        self.system.solve(self.method, self._change, self._answer, scale=velocity)
         with together():
             for f, change, out in zip(self._start, self._answer, self.out, strict=True):
                 algebra.add_scaled.launch(self.layout, self.device, [f, change, self._numbers.one], [out])
@@ -247,7 +247,7 @@ class CoupledDiffusion:
         """
         top, beta = self.system.levels[0], self.medium.levels[0].beta
         answer = self._answer
-        self.system.solve(self.method, out_bar, answer, whole=out_bar)
+        self.system.solve(self.method, out_bar, answer, scale=out_bar)
         top.residual(out_bar, answer, self._change)
         with together():
             for change, b, start in zip(self._change, beta, self._start, strict=True):
