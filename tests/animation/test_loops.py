@@ -44,8 +44,8 @@ def test_periods_are_fitted_to_the_loop():
     )
     swing, fade = fit_to_loop(force, 1.0).envelope.factors
     assert (swing.period, swing.start, swing.centred) == (0.5, 0.0, False) and fade == Fade(rise=0.3)
-    whole = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
-    assert swing.value(0.3) == pytest.approx(whole.value(0.3))
+    full = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
+    assert swing.value(0.3) == pytest.approx(full.value(0.3))
     assert fit_to_loop(NoiseForce(strength=1.0, period=0.9), 2.0).period == 1.0
 
 

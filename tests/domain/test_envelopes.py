@@ -45,8 +45,8 @@ def value(name, t):
     if name == "twice the fade in a window":
         return np.where((t >= 0.4) & (t < 1.1), 2 * value("fade", t), 0.0)
     s = t - 0.3
-    course = 0.7 * np.cos(2 * np.pi * s / 0.9) * np.where(s < 0.45, 0.5, 1.0)
-    return np.where((t >= 0.3) & (t < 1.7), course, 0.0)
+    factor = 0.7 * np.cos(2 * np.pi * s / 0.9) * np.where(s < 0.45, 0.5, 1.0)
+    return np.where((t >= 0.3) & (t < 1.7), factor, 0.0)
 
 
 @pytest.mark.parametrize("name", ENVELOPES)

@@ -30,7 +30,7 @@ rounding of a value below 10, 1.5 eps value / STEP, is below 2e-11."""
 TOLERANCE = 1e-8
 
 STEPS = {
-    "the whole": (0.0, 2.0),
+    "the entire window": (0.0, 2.0),
     "the beginning": (0.15, 0.45),
     "the half period": (0.55, 0.95),
     "the end": (1.25, 1.9),
@@ -168,8 +168,8 @@ def test_slopes_of_steps_add_up(name, cuts):
     envelope = ENVELOPES[name][0](np.random.default_rng(0))
     jumps = [t for t, _, _ in envelope.jumps(0.0, 2.0)]
     edges = sorted([0.0, *cuts, *jumps, 2.0])
-    whole = envelope.slopes(0.0, 2.0)
-    for key, slope in whole.items():
+    total = envelope.slopes(0.0, 2.0)
+    for key, slope in total.items():
         parts = sum(envelope.slopes(a, b)[key] for a, b in pairwise(edges))
         np.testing.assert_allclose(parts, slope, atol=TOLERANCE, err_msg=key)
 
@@ -205,13 +205,13 @@ CENTERS = {
     "a function": (lambda random: lambda t: (t, 1 - t), []),
 }
 
-COURSES = {
+FORCE_ENVELOPES = {
     "constant": (lambda random: Constant(0.2, 1.3), []),
     "centred": (centred, [f"envelope.{name}" for name in WAVE]),
     "all": (ENVELOPES["all"][0], [f"envelope.{name}" for name in ENVELOPES["all"][1]]),
 }
 
-BLOBS = {
+GAUSSIANS = {
     "push": (GaussianForce, "vector"),
     "vortex": (VortexForce, "spin"),
     "growth": (Growth, "rate"),
@@ -220,13 +220,17 @@ BLOBS = {
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
 @pytest.mark.parametrize("center", CENTERS)
-@pytest.mark.parametrize("kind", BLOBS)
-def test_a_gaussian_pulls_back_through_its_impulse(kind, center, course, step):
+@pytest.mark.parametrize("kind", GAUSSIANS)
+def test_a_gaussian_pulls_back_through_its_impulse(kind, center, timing, step):
     """With random weights of all entries of the impulse, the gradient of their sum."""
     random = np.random.default_rng([len(kind), len(center), len(step)])
-    (make, name), (place, center_names), (envelope, names) = BLOBS[kind], CENTERS[center], COURSES[course]
+    (make, name), (place, center_names), (envelope, names) = (
+        GAUSSIANS[kind],
+        CENTERS[center],
+        FORCE_ENVELOPES[timing],
+    )
     number = random.uniform(-2, 2, 2) if name == "vector" else random.uniform(-2, 2)
     force = make(place(random), number, random.uniform(0.1, 0.3), envelope(random))
     bar, (start, end) = random_blob(random), STEPS[step]
@@ -239,15 +243,15 @@ def test_a_gaussian_pulls_back_through_its_impulse(kind, center, course, step):
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
-def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(course, step):
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
+def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(timing, step):
     random = np.random.default_rng(len(step))
     path = Path((0.2, 0.5, 0.61, 1.4), random.uniform(size=(4, 2)))
-    stroke = Stroke(path, 0.2, random.uniform(0.5, 1.5), COURSES[course][0](random))
+    stroke = Stroke(path, 0.2, random.uniform(0.5, 1.5), FORCE_ENVELOPES[timing][0](random))
     bar, (start, end) = random_blob(random), STEPS[step]
     assert_slopes(
         stroke.pull_back(start, end, bar),
-        ["strength", "radius", *COURSES[course][1]],
+        ["strength", "radius", *FORCE_ENVELOPES[timing][1]],
         lambda changed: numbers(bar) @ numbers(changed.impulse(start, end)),
         stroke,
     )
@@ -272,27 +276,27 @@ FIELDS = {
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
 @pytest.mark.parametrize("kind", FIELDS)
-def test_a_field_pulls_back_through_its_integrals(kind, course, step):
+def test_a_field_pulls_back_through_its_integrals(kind, timing, step):
     random, (make, integrals, names) = np.random.default_rng(len(step)), FIELDS[kind]
-    force = make(random, COURSES[course][0](random))
+    force = make(random, FORCE_ENVELOPES[timing][0](random))
     bar = random.normal(size=np.shape(integrals(force, *STEPS[step])))
     assert_slopes(
         force.pull_back(*STEPS[step], bar),
-        [*names, *COURSES[course][1]],
+        [*names, *FORCE_ENVELOPES[timing][1]],
         lambda changed: bar @ integrals(changed, *STEPS[step]),
         force,
     )
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
-def test_a_painted_source_pulls_back_to_its_envelope(course, step):
-    source = PaintedSource(Painted(RAMP), COURSES[course][0](np.random.default_rng(1)))
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
+def test_a_painted_source_pulls_back_to_its_envelope(timing, step):
+    source = PaintedSource(Painted(RAMP), FORCE_ENVELOPES[timing][0](np.random.default_rng(1)))
     assert_slopes(
         source.pull_back(*STEPS[step], -0.7),
-        COURSES[course][1],
+        FORCE_ENVELOPES[timing][1],
         lambda changed: -0.7 * changed.envelope.integral(*STEPS[step]),
         source,
     )

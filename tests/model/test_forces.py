@@ -131,11 +131,11 @@ def test_an_impulse_over_a_window_does_not_depend_on_the_steps(make_solver, cut)
         GaussianForce((0.5, 0.35), (0.8, -0.4), 0.05, envelope),
         VortexForce((0.2, 0.3), 3.0, 0.04, envelope),
     ]
-    whole = pushed(make_solver, forces, 0.0, 0.5)
+    total = pushed(make_solver, forces, 0.0, 0.5)
     steps = [pushed(make_solver, forces, n * 0.5 / cut, 0.5 / cut) for n in range(cut)]
     for n in (0, 1):
-        np.testing.assert_allclose(sum(step[n] for step in steps), whole[n], atol=1e-6)
-    assert np.abs(whole[0]).max() == pytest.approx(0.8 * abs(envelope.integral(0, 0.5)), rel=0.05)
+        np.testing.assert_allclose(sum(step[n] for step in steps), total[n], atol=1e-6)
+    assert np.abs(total[0]).max() == pytest.approx(0.8 * abs(envelope.integral(0, 0.5)), rel=0.05)
 
 
 def test_a_moving_force_follows_its_path(make_solver):
@@ -213,8 +213,8 @@ def test_curl_noise_does_not_depend_on_the_grid_and_has_the_given_strength():
 
 def test_changing_noise_repeats_after_its_period(make_solver):
     noise = NoiseForce(strength=1.0, scale=0.3, period=0.4)
-    first, half, whole = (pushed(make_solver, [noise], t, 0.01)[0] for t in (0.0, 0.2, 0.4))
-    np.testing.assert_allclose(whole, first, atol=1e-6)
+    first, half, total = (pushed(make_solver, [noise], t, 0.01)[0] for t in (0.0, 0.2, 0.4))
+    np.testing.assert_allclose(total, first, atol=1e-6)
     np.testing.assert_allclose(half, -first, atol=1e-6)
 
 
@@ -370,7 +370,7 @@ def carried(make_solver, force, duration, steps, n=128):
 
 
 @pytest.mark.parametrize(
-    ("text", "course"),
+    ("text", "motion"),
     [
         ("256,256:6,3:radius=40", "end"),
         ("256,256:6,3:radius=40,at=0", "end"),
@@ -378,11 +378,11 @@ def carried(make_solver, force, duration, steps, n=128):
         ("256,256:-6,-3:radius=40,period=0.5,phase=0.75", "swing"),
     ],
 )
-def test_a_push_moves_its_center_by_its_arrow(make_solver, text, course):
+def test_a_push_moves_its_center_by_its_arrow(make_solver, text, motion):
     """Inviscid, arrow short beside the radius: within 10 % (walls, and the blob moves off its force)."""
     force = Drawing(512, 512, 1.0).force(parse_force("push", text))
     way = (carried(make_solver, force, 1.0, 96) - force.center) * 512
-    reached = way[-1] if course == "end" else (way[48:].max(axis=0) - way[48:].min(axis=0)) / 2
+    reached = way[-1] if motion == "end" else (way[48:].max(axis=0) - way[48:].min(axis=0)) / 2
     np.testing.assert_allclose(reached, (6, 3), rtol=0.1)
 
 

@@ -142,15 +142,15 @@ def test_the_map_since_the_start_is_the_animations_own(name):
 
 def test_linear_interpolation_between_steps_is_of_second_order(name):
     """Every second and every fourth step of one flow, compared with the steps left out."""
-    whole, errors = turned(name, 32, 24), []
+    full, errors = turned(name, 32, 24), []
     for stride in (4, 2):
-        some = replace(whole, from_start=whole.from_start[::stride], to_end=whole.to_end[::stride])
+        some = replace(full, from_start=full.from_start[::stride], to_end=full.to_end[::stride])
         parts = np.arange(stride // 2, 24, stride) / 24
         errors.append(
             max(
                 np.abs(one(part).displacement - other(part).displacement).max()
                 for part in parts
-                for one, other in ((some.since_start, whole.since_start), (some.until_end, whole.until_end))
+                for one, other in ((some.since_start, full.since_start), (some.until_end, full.until_end))
             )
         )
     assert 1.6 < falls(errors)[0] < 2.4 and errors[1] < 0.003, errors

@@ -15,11 +15,11 @@ def padded(f, layout):
 
 def put_padded(values, f, layout):
     """Write values with ghosts, (ny + 4, nx + 4), into a field."""
-    whole = f.numpy().copy()
+    buffer = f.numpy().copy()
     rows = layout.size // layout.pitch
-    grid = whole[: rows * layout.pitch].reshape(rows, layout.pitch)
+    grid = buffer[: rows * layout.pitch].reshape(rows, layout.pitch)
     grid[: layout.ny + 2 * HALO, : layout.nx + 2 * HALO] = values
-    f.assign(whole)
+    f.assign(buffer)
 
 
 def noise(layout, device, components, seed, *ghosts):

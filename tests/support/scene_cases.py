@@ -140,7 +140,7 @@ def size(animation):
 # Courses in time: what is given in each quarter of a second
 
 
-def course(f):
+def integrals_of(f):
     """Integrals of a function of the time, by midpoints."""
     middles = (np.arange(4000) + 0.5) / 4000 * 0.25
     return np.array([float(np.mean(f(t + middles))) / 4 for t in QUARTERS])
@@ -152,18 +152,18 @@ def smooth(s):
     return s * s * (3 - 2 * s)
 
 
-STEADY, FIRST_HALF = course(np.ones_like), course(lambda t: t < 1)
+STEADY, FIRST_HALF = integrals_of(np.ones_like), integrals_of(lambda t: t < 1)
 WAVE = 2 * np.pi / 0.7
 """Envelopes with a period of 0.7 s."""
 
-COURSES = {
-    "start": (0.5, {}, course(lambda t: t > 0.5), 2 / 1.5**2),
-    "end": (1.25, {}, course(lambda t: t < 1.25), 2 / 1.25**2),
+TIMINGS = {
+    "start": (0.5, {}, integrals_of(lambda t: t > 0.5), 2 / 1.5**2),
+    "end": (1.25, {}, integrals_of(lambda t: t < 1.25), 2 / 1.25**2),
     "at": (0.5, {}, (QUARTERS == 0.5) * 1.0, 1 / 1.5),
-    "period": (0.7, {}, course(lambda t: np.cos(WAVE * t) * np.where(t < 0.35, 0.5, 1)), WAVE**2),
-    "phase": (0.1, {"period": 0.7}, course(lambda t: np.sin(WAVE * t + 0.2 * np.pi)), WAVE**2),
-    "rise": (0.5, {}, course(lambda t: smooth(t / 0.5)), 0.5),
-    "fall": (0.5, {}, course(lambda t: smooth((2 - t) / 0.5)), 0.5),
+    "period": (0.7, {}, integrals_of(lambda t: np.cos(WAVE * t) * np.where(t < 0.35, 0.5, 1)), WAVE**2),
+    "phase": (0.1, {"period": 0.7}, integrals_of(lambda t: np.sin(WAVE * t + 0.2 * np.pi)), WAVE**2),
+    "rise": (0.5, {}, integrals_of(lambda t: smooth(t / 0.5)), 0.5),
+    "fall": (0.5, {}, integrals_of(lambda t: smooth((2 - t) / 0.5)), 0.5),
     "strength": (-3.0, {}, -3 * STEADY, 0.5),
     "envelope": ("half", {}, FIRST_HALF, 0.5),
 }
@@ -179,7 +179,7 @@ def growing(key, given):
         return given / STEADY.sum()
     if key in ("period", "phase"):
         ahead = 0.25 if key == "period" else 0.1
-        return WAVE * course(lambda t: np.sin(WAVE * t + 2 * np.pi * ahead))
+        return WAVE * integrals_of(lambda t: np.sin(WAVE * t + 2 * np.pi * ahead))
     return given / given.sum()
 
 
@@ -221,7 +221,7 @@ def less(table, *names):
 
 def _forces():
     for kind, (table, given) in FORCES.items():
-        for key, (value, needs, in_time, per_length) in COURSES.items():
+        for key, (value, needs, in_time, per_length) in TIMINGS.items():
             if (kind, key) == ("grow", "at"):
                 continue
             in_time = growing(key, in_time) if kind == "grow" else per_length * in_time
@@ -257,15 +257,15 @@ def _forces():
 
 def _strokes():
     """A brush that moves by 30 px in its window."""
-    whole, late = drag(30, 2, 6), course(lambda t: t > 0.5)
+    total, late = drag(30, 2, 6), integrals_of(lambda t: t > 0.5)
     path = [[0, 10, 20], [1, 40, 20]]
     yield "points", Case([[10, 20], [30, 20]], work, np.outer(STEADY, drag(20, 2, 6)))
     yield "path", Case(path, work, np.outer(FIRST_HALF, drag(30, 1, 6)), less(STROKE, "points"), STROKE)
     yield "radius", Case(12, work, np.outer(STEADY, drag(30, 2, 12)))
     yield "start", Case(0.5, work, np.outer(late, drag(30, 1.5, 6)))
     yield "end", Case(1, work, np.outer(FIRST_HALF, drag(30, 1, 6)))
-    yield "strength", Case(-3, work, np.outer(-3 * STEADY, whole))
-    yield "envelope", Case("half", work, np.outer(FIRST_HALF, whole), more=HALF)
+    yield "strength", Case(-3, work, np.outer(-3 * STEADY, total))
+    yield "envelope", Case("half", work, np.outer(FIRST_HALF, total), more=HALF)
 
 
 def _envelopes():
@@ -287,16 +287,16 @@ def _envelopes():
         (ramp, "times", [0, 1], lambda t: np.maximum(1 - t, 0)),
         (ramp, "values", [3, -1], lambda t: 3 - 2 * t),
     ):
-        yield table["kind"], key, Case(value, work, np.outer(course(f) / 2, push(6, 3)), table)
+        yield table["kind"], key, Case(value, work, np.outer(integrals_of(f) / 2, push(6, 3)), table)
 
 
 def _sources():
     """A source adds its amount over its window, times its strength and further envelopes."""
-    for key, (value, needs, in_time, _) in COURSES.items():
+    for key, (value, needs, in_time, _) in TIMINGS.items():
         if key in ("period", "phase"):
             continue
-        whole = STEADY.sum() if key in ("strength", "envelope") else abs(in_time.sum())
-        yield key, Case(value, poured, in_time / whole, {**SPOT, **needs}, more=HALF)
+        total = STEADY.sum() if key in ("strength", "envelope") else abs(in_time.sum())
+        yield key, Case(value, poured, in_time / total, {**SPOT, **needs}, more=HALF)
     yield "center", Case([15, 30], places_of_source, [(0.25, 0.5)] * 8)
     yield "path", Case(PATH, places_of_source, ALONG_PATH, {}, SPOT)
     yield "radius", Case(12, lambda a: source_of(a).radius, 0.2)
