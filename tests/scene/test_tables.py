@@ -133,4 +133,4 @@ def test_a_morph_has_no_flags_that_it_has_no_use_for():
     assert not (forces | others) & vars(options).keys()
     reasons = [reason for _, _, table in tables() for reason in table.not_in_morph.values()]
     assert set(SCENE.not_in_morph) == {"effect", "force", "group", "density", "layer", "tracks"}
-    assert len(reasons) == 10 and all(reason.startswith("a morph goes without: ") for reason in reasons)
+    assert len(reasons) == 10 and all(reason.startswith("not allowed in a morph: ") for reason in reasons)

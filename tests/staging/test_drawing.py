@@ -15,7 +15,7 @@ PUSH = {"kind": "push", "center": [30, 20], "by": [5, 0]}
         ({"period": -1}, "period: -1: expected a number from 0.001"),
         ({"start": -1}, "start: -1: expected a number from 0"),
         ({"kind": "psuh"}, "kind: 'psuh': expected one of push, vortex"),
-        ({"at": 0.1, "rise": 0}, "at= is one blow; it goes without"),
+        ({"at": 0.1, "rise": 0}, "at= is an impulse: leave out"),
         ({"phase": 0.25}, "phase= needs period="),
     ],
 )

@@ -66,6 +66,9 @@ class Force(ABC):
 class LocalForce(Force):
     """A force whose shape is a Gaussian's."""
 
+    radius: float
+    """Sigma of the Gaussian [longer side]."""
+
     @abstractmethod
     def impulse(self, start: float, end: float) -> GaussianImpulse:
         """What it does from `start` to `end` [s]."""
