@@ -137,7 +137,7 @@ def test_a_wrong_short_form_is_refused_by_its_part(kind, text, says):
     ("text", "says"),
     [
         ("30,20", "ink '30,20': expected X,Y:#RRGGBB or"),
-        ("30:#aabbcc", "the point X,Y needs two numbers"),
+        ("30:#aabbcc", "the point X,Y is '30': expected two numbers"),
         ("30,20:#aabbcc:phase", "'phase' is not key=value with a key of radius, amount, start"),
         ("30,20:#aabbcc:rate=3", "'rate=3' is not key=value"),
         ("30,20:#aabbcc:lift=high", "lift: 'high' is not a number"),

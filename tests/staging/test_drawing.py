@@ -34,3 +34,11 @@ def test_noise_that_names_no_seed_has_the_one_that_is_given():
     drawing = Drawing(60, 40, duration=1.0)
     assert drawing.force(NoiseTable(amount=3), 7).seed == 7
     assert drawing.force(NoiseTable(amount=3, seed=0), 7).seed == 0
+
+
+def test_a_force_with_a_picture_needs_the_reader_of_pictures():
+    """A drawing has one only if it is given."""
+    with pytest.raises(ValueError, match=r"needs Drawing\(…, images=SceneImages\(…\)\)"):
+        Drawing(60, 40, 1.0).force({"kind": "image", "file": "a.png"})
+    with pytest.raises(ValueError, match="with a picture or a mask"):
+        Drawing(60, 40, 1.0).force({"kind": "wind", "by": [1, 0], "mask": "a.png"})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from wfluid.domain.limits import (
     BLEND_SPACES,
     CURVES,
@@ -75,6 +77,11 @@ Curve = str | tuple[tuple[float, float], ...]
 """A curve's name, or its keys."""
 
 
+def _curve_key(what: str) -> Any:
+    meaning = f"progress of the {what} over time: linear, ease, or [[s, 0 … 1], …]"
+    return key(meaning, curve(CURVES), default=EASE, flag=f"--{what}-curve", metavar="CURVE")
+
+
 class MorphTable(SceneTable):
     """A morph into another picture; keyframes lead from points of the first to points of the second."""
 
@@ -83,20 +90,8 @@ class MorphTable(SceneTable):
         "size of the frame that its pixels refer to", SIZE, unit="px", otherwise="its own"
     )
     fit: str = key("fit of the second picture to the frame", word(*FITS), default=FITS[0], flag="--fit")
-    warp_curve: Curve = key(
-        "progress of the warp over time: linear, ease, or [[s, 0 … 1], …]",
-        curve(CURVES),
-        default=EASE,
-        flag="--warp-curve",
-        metavar="CURVE",
-    )
-    blend_curve: Curve = key(
-        "progress of the blend over time: linear, ease, or [[s, 0 … 1], …]",
-        curve(CURVES),
-        default=EASE,
-        flag="--blend-curve",
-        metavar="CURVE",
-    )
+    warp_curve: Curve = _curve_key("warp")
+    blend_curve: Curve = _curve_key("blend")
     blend: str = key(
         "blend linear light, or display values",
         word(*BLEND_SPACES),
