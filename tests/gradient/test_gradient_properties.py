@@ -206,7 +206,10 @@ def test_memory_is_what_the_schedule_says(device, case, steps):
     timeline = Timeline(steps / 48, fps=48, substeps=1)
     case = loosely(case, objective=ParticleMisfit(PARTICLES.points, PARTICLES.destinations, steps / 48))
     functional = case.functional(device, timeline=timeline)
-    densities, coupled = len(case.fluid.get("densities", ())), functional._recording.step.medium is not None
+    densities, coupled = (
+        len(case.fluid.get("densities", ())),
+        functional._recording.step.coefficients is not None,
+    )
     cells = functional._recording.step.layout.size
     numbers = (4 + densities + coupled) * cells + 2 * len(PARTICLES.points)
     each = numbers * np.dtype(wp.dtype_to_numpy(Real)).itemsize

@@ -99,8 +99,8 @@ def vector(layout: Layout, device: wp.Device, components: int) -> Vector:
     return tuple(field(layout, device) for _ in range(components))
 
 
-def where(grid: Grid, walls: Walls, layout: Layout) -> list[int]:
-    """What programs that look values up need to know: cells, which axes wrap, and the pitch."""
+def lookup_args(grid: Grid, walls: Walls, layout: Layout) -> list[int]:
+    """Arguments of the kernels that interpolate: nx, ny, whether each axis is periodic, and the pitch."""
     periodic_x, periodic_y = walls.periodic
     return [grid.nx, grid.ny, int(periodic_x), int(periodic_y), layout.pitch]
 

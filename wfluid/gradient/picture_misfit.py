@@ -85,7 +85,7 @@ class _PictureTerm(DeviceObjective):
         self._look_up = LookUp(
             misfit.picture.shrunk(width, height),
             grid,
-            step.fluid.walls,
+            step.fluid.boundary,
             self.device,
             width=width,
             height=height,

@@ -120,8 +120,8 @@ class Recording:
             StepTable(a, rows) for a in (self._forcing.numbers, self._forcing.boxes, self._forcing.bars)
         )
         self._pulls = [StepTable(p, rows + 1) for p in self._before.particles]
-        changes = step.medium and step.medium.changes
-        self._viscosities = StepTable(step.medium.painted_mu, rows) if changes else None
+        changes = step.coefficients and step.coefficients.changes
+        self._viscosities = StepTable(step.coefficients.painted_mu, rows) if changes else None
         self._squares = zeros(2 * grid.ny if effort else 0, device)
         self._square_rows = StepTable(self._squares, rows)
         self._counter, self._pool = StepCounter(device), step.helpers(alone=True)
@@ -164,15 +164,15 @@ class Recording:
 
     def _kept(self, state: State) -> list[wp.array]:
         """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
-        fields = state.fields if self.step.medium else [f for f in state.fields if f is not state.q]
+        fields = state.fields if self.step.coefficients else [f for f in state.fields if f is not state.q]
         return [*fields, *state.particles]
 
     def _planned(self, memory_mb: float | None) -> Schedule:
         breaks = [step for step, terms in self._terms.items() if terms]
         if memory_mb is None:
             return even_segments(self.steps, breaks=breaks)
-        medium, row = self.step.medium, sum(a.capacity for a in self._kept(self._before))
-        if medium and medium.changes:
+        coefficients, row = self.step.coefficients, sum(a.capacity for a in self._kept(self._before))
+        if coefficients and coefficients.changes:
             row += self._before.u.capacity  # each step's own viscosity
         each = row / MEGABYTE
         try:
@@ -207,7 +207,7 @@ class Recording:
         for n in range(-before, self.steps):
             kept = self.step.kept(dt, dt if self._stretch.first + n else 0.0, swelled)
             t, until = self.time_of(n), self.time_of(n + 1)
-            rows.append(self._forcing.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
+            rows.append(self._forcing.row(setup.forces, setup.fluid, t, dt, until, kept, act_at_zero=True))
             swelled = rows[-1].prescribed > 0
         self._all_numbers = np.stack([row.numbers for row in rows[before:]])
         self._all_boxes = np.stack([row.boxes for row in rows[before:]])
@@ -225,7 +225,7 @@ class Recording:
 
     def _prepare(self) -> None:
         if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self.step.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self.step.update_coefficients, self._pool)
         self._preparation.launch()
 
     def _record(self) -> None:
@@ -255,16 +255,16 @@ class Recording:
         """Take the step's own viscosity, where it depends on the time; launches only."""
         if not self._viscosities:
             return
-        medium = self.step.medium
-        self._viscosities.take(self._counter, medium.painted_mu)
-        medium.fill_painted()
+        coefficients = self.step.coefficients
+        self._viscosities.take(self._counter, coefficients.painted_mu)
+        coefficients.fill_painted()
         if not self.step.fluid.viscosity_moves:  # else it is taken along in the step
-            self.step.follow_medium()
+            self.step.update_coefficients()
 
     def _measure_effort(self) -> None:
         """Squares of what forces add to the velocity, summed along rows; launches only."""
         state, layout = self._before, self.step.layout
-        pushed = self.step.pushed if self._forcing.pushes else (state.u, state.v)
+        pushed = self.step.pushed if self._forcing.adds_velocity else (state.u, state.v)
         for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
             inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
             misfit.row_squares.launch(layout.ny, self.device, inputs, [self._squares])
@@ -361,8 +361,8 @@ class Recording:
                 self._do(action)
         layout, numbers = self.step.layout, self._all_numbers
         velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
-        if self.step.medium:
-            self.step.medium.fold_painted()
+        if self.step.coefficients:
+            self.step.coefficients.fold_painted()
         return RunGradients(
             np.stack(velocity),
             to_numpy(self.step.mu_bar, layout).astype(np.float64),
@@ -448,7 +448,7 @@ class Recording:
         self._boxes.put(base, self._all_boxes[start:end])
         for step in range(start, end) if self._viscosities else ():
             row = self._viscosities.row(base + step - start)
-            from_numpy(self.step.medium.at(self.time_of(step + 1)), row, self.step.layout)
+            from_numpy(self.step.coefficients.at(self.time_of(step + 1)), row, self.step.layout)
         self._copy(self._kept(self._before), [table.row(base) for table in self._states])
 
     def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:

@@ -83,6 +83,11 @@ class Fluid:
         return tuple(density.name for density in self.densities)
 
     @property
+    def boundary(self) -> Walls:
+        """`walls`, which a fluid turns into `Walls` when it is made."""
+        return Walls.parse(self.walls)
+
+    @property
     def uniform(self) -> bool:
         """Whether one viscosity, and no drag, holds everywhere and at all times."""
         return isinstance(self.viscosity, float) and self.freeze is None
@@ -90,5 +95,5 @@ class Fluid:
     @property
     def separable(self) -> bool:
         """Whether the two components of the velocity may be diffused apart from each other."""
-        walls = Walls.parse(self.walls)
+        walls = self.boundary
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
