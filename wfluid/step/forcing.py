@@ -195,8 +195,8 @@ class Forcing:
             if abs(impulse.swell) * dt > STEP_GROWTH:
                 raise ValueError(
                     f"the growth at {impulse.center} would change areas by exp({impulse.swell * dt:.3g}) "
-                    f"in a step of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer window "
-                    "help"
+                    f"in a step of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer "
+                    "window help"
                 )
             gained = max(impulse.gained, abs(impulse.swell) * impulse.radius)
             _check(f"the force at {impulse.center}", gained, t, until)

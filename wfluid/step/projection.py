@@ -129,7 +129,7 @@ class Projection:
         algebra.subtract.launch(self.layout, self.device, [self._scaled_bar], [q.grad])
 
     def project(self, velocity: Vector, out: Vector, sources: Forcing | None = None) -> None:
-        """out = the projected velocity. Its divergence is what `sources` prescribe, or 0. Both have ghosts."""
+        """out = the projected velocity; its divergence is what `sources` prescribe, or 0. With ghosts."""
         beta, pitch = self._beta, self.layout.pitch
         self._find_minus_divergence(velocity)
         if sources:
