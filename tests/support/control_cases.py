@@ -190,7 +190,7 @@ def cells_of_traces(functional):
     lines = layout.size // layout.pitch
     u, v, d_x, d_y = (
         table.rows(0, steps)[:, : lines * layout.pitch].reshape(steps, lines, layout.pitch)
-        for table in recording._states[:4]
+        for table in recording.loops.states[:4]
     )
     inner = slice(HALO, HALO + layout.ny), slice(HALO, HALO + layout.nx)
     paper, found = fluid.scheme == "paper", []

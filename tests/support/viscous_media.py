@@ -49,14 +49,14 @@ def frozen(alpha):
 
 
 def coupled(grid, mu, alpha, walls, device, dt=DT, **settings):
-    """The coupled diffusion of a medium, prepared for solves."""
+    """The coupled diffusion with given coefficients, ready to run."""
     fluid = Fluid(viscosity=mu, freeze=frozen(alpha), walls=walls, **settings)
-    medium = Coefficients(grid, fluid, device)
-    diffusion = CoupledDiffusion(fluid, medium, device)
-    medium.set_time(0.0, dt)
+    coefficients = Coefficients(grid, fluid, device)
+    diffusion = CoupledDiffusion(fluid, coefficients, device)
+    coefficients.set_time(0.0, dt)
     diffusion.plan(dt)
-    medium.coarsen()
-    diffusion.prepare()
+    coefficients.coarsen()
+    diffusion.update_coefficients()
     return diffusion
 
 
