@@ -87,15 +87,16 @@ def main():
         for step in range(6):
             solver.step(a, b, [FORCE], step * dt, dt)
             a, b = b, a
-        controls, top = solver._impulses_for([FORCE]), solver._stages.projection.system.levels[0]
+        controls, top = solver._forcing_for([FORCE]), solver._step.projection.system.levels[0]
         ten_sweeps = lambda: top.smooth(top.b, top.x, [top.plain] * 10, top.r, top.y)  # noqa: B023, E731
+        foot = solver._step.trace(a, controls)
         stages = {
             "10 Jacobi sweeps": graph(device, ten_sweeps),
-            "foot": graph(device, lambda: solver._stages.trace(a, controls)),  # noqa: B023
-            "velocity, cubic": graph(device, lambda: [solver._stages.advect((a.u, a.v))]),  # noqa: B023
-            "map, cubic": graph(device, lambda: solver._stages.carry_map(a, b)),  # noqa: B023
-            "diffusion": graph(device, lambda: [solver._stages.diffusion.diffuse((a.u, a.v))]),  # noqa: B023
-            "projection": graph(device, lambda: solver._stages.project((a.u, a.v), (b.u, b.v))),  # noqa: B023
+            "foot": graph(device, lambda: solver._step.trace(a, controls)),  # noqa: B023
+            "velocity, cubic": graph(device, lambda: [solver._step.advect((a.u, a.v), foot)]),  # noqa: B023
+            "map, cubic": graph(device, lambda: solver._step.carry_map(a, foot, b)),  # noqa: B023
+            "diffusion": graph(device, lambda: solver._step.diffusion.diffuse((a.u, a.v))),  # noqa: B023
+            "projection": graph(device, lambda: solver._step.project((a.u, a.v), (b.u, b.v))),  # noqa: B023
             "whole step": lambda: (solver.step(a, b, [FORCE], 0.1, dt), wp.synchronize_device(device)),  # noqa: B023
         }
         peer = jax_step(n, 0.001, dt) if not device.is_cuda else None

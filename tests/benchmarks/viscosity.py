@@ -47,7 +47,7 @@ def prepared(n, mu, alpha, device):
         solver.step(a, b, [FORCE], step * DT, DT)
         a, b = b, a
     velocity, rng = vector(solver.layout, device, 2), np.random.default_rng(0)
-    for f, ghosts in zip(velocity, solver._stages.velocity_ghosts, strict=True):
+    for f, ghosts in zip(velocity, solver._step.velocity_ghosts, strict=True):
         from_numpy(rng.standard_normal((n, n)), f, solver.layout)
         ghosts.fill(f)
     return solver, a, b, velocity
@@ -60,13 +60,13 @@ def stepping(solver, a, b, dt, device):
 
 def errors(diffusion, velocity):
     """Of the solve planned: missing part of the change in the operator's norm, and of the velocity."""
-    system, how = diffusion.system, diffusion.how
+    system, method = diffusion.system, diffusion.method
     diffusion.diffuse(velocity)
     exact, left, back = (vector(diffusion.layout, diffusion.device, 2) for _ in range(3))
     best = SolveMethod("conjugate gradients", 60, 1e-6)
     system.prepare(best)
-    system.solve(best, diffusion._change, exact)
-    for f, g, out in zip(exact, diffusion._answer, left, strict=True):
+    system.solve(best, diffusion._b, exact)
+    for f, g, out in zip(exact, diffusion._x, left, strict=True):
         out.assign(f.numpy() - g.numpy())
 
     def energy(x):
@@ -78,7 +78,7 @@ def errors(diffusion, velocity):
 
     size = diffusion.system.inner.norm
     figures = energy(left) / energy(exact), size(left) / size(velocity)
-    diffusion.how = how
+    diffusion.method = method
     diffusion.diffuse(velocity)
     return figures
 
@@ -107,7 +107,7 @@ def main():
         print(f"{'':20s} {head[0]:20s}" + "".join(f"{word:>13s}" for word in head[1:]))
         for name, (mu, alpha) in media(n).items():
             solver, a, b, velocity = prepared(n, mu, alpha, device)
-            diffusion, projection = solver._stages.diffusion, solver._stages.projection
+            diffusion, projection = solver._step.diffusion, solver._step.projection
             missing = errors(diffusion, velocity)
             report = diffusion.measure()
             seconds = alternate(

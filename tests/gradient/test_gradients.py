@@ -50,7 +50,7 @@ class Remainders:
     def __init__(self, functional):
         self.functional, self.m = functional, functional.start
         self.value, self.gradient = functional.value_and_gradient(self.m)
-        paper = functional._recording.stages.fluid.scheme == "paper"
+        paper = functional._recording.step.fluid.scheme == "paper"
         self.cells = cells_of_traces(functional) if paper else None
         self.steps = self.rejected = 0
 

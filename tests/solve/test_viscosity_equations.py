@@ -83,7 +83,7 @@ def test_row_sums_bound_the_spectrum(device, name):
         matrix, *free = stress_matrix(grid, mu, alpha, DT, names(walls))
         weights = unknowns(diffusion.system.levels[0].weights, diffusion.layout, free)
         values = np.linalg.eigvals(weights[:, None] * matrix.toarray()).real
-        stiffness = diffusion.medium.stiffness(DT)
+        stiffness = diffusion.coefficients.stiffness(DT)
         assert values.max() < 1 + 1e-12 and values.min() > stiffness.least - 1e-12
         assert np.linalg.eigvalsh(matrix.toarray()).max() < stiffness.greatest
 
@@ -129,11 +129,11 @@ def test_components_apart_equal_both_together_after_the_projection(make_solver, 
     for coupled_too in (False, True):
         fluid = {"diffusion_tolerance": 1e-11, "pressure_cycles": 20}
         solver = make_solver(31, 24, viscosity=0.01, walls=walls, **fluid)
-        assert isinstance(solver._stages.diffusion, SeparateDiffusion)
+        assert isinstance(solver._step.diffusion, SeparateDiffusion)
         if coupled_too:
             mu = np.full((24, 31), 0.01)
             solver = make_solver(31, 24, viscosity=mu, walls=walls, **fluid)
-            assert isinstance(solver._stages.diffusion, CoupledDiffusion)
+            assert isinstance(solver._step.diffusion, CoupledDiffusion)
         a, b = solver.rest(), solver.rest()
         solver.set_velocity(a, *noise_velocity(solver))
         solver.project(a, b)
@@ -150,7 +150,7 @@ def test_at_a_no_slip_wall_they_differ_and_the_coupled_one_is_used(make_solver):
     solver = make_solver(
         31, 24, viscosity=0.01, walls="no-slip", diffusion_tolerance=1e-11, pressure_cycles=20
     )
-    assert isinstance(solver._stages.diffusion, CoupledDiffusion)
+    assert isinstance(solver._step.diffusion, CoupledDiffusion)
     apart = SeparateDiffusion(solver.grid, solver.fluid, solver.device)
     apart.plan(0.1)
     a, b = solver.rest(), solver.rest()

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from oracles import from_streamfunction
 
-from wfluid.domain.envelopes import Constant, Instantaneous, Oscillator
+from wfluid.domain.envelopes import Constant, Instantaneous
 from wfluid.domain.grid import Grid
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.paths import Path
 from wfluid.fields.arrays import to_numpy
 from wfluid.model.densities import Density, PaintedSource, Source
@@ -151,7 +152,7 @@ def test_buoyancy_is_the_density_times_its_vector(make_solver):
     densities = [Density("ink"), Density("smoke", initial=Painted(values))]
     solver = make_solver(40, 30, grid=GRID, densities=densities)
     solver.step(solver.rest(), solver.rest(), [Buoyancy("smoke", (0.3, -2.0), Constant(0, 0.05))], 0.0, 0.1)
-    u, v = (to_numpy(f, solver.layout) for f in solver._stages.pushed)
+    u, v = (to_numpy(f, solver.layout) for f in solver._step.pushed)
     np.testing.assert_allclose(u[:, 1:], 0.015 * (values[:, 1:] + values[:, :-1]) / 2, atol=1e-7)
     np.testing.assert_allclose(v[1:], -0.1 * (values[1:] + values[:-1]) / 2, atol=1e-7)
     plume = Density("smoke", sources=[Source((0.5, 0.6), 5.0, 0.05)])

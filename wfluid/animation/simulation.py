@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from wfluid.fields.state import State
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
 from wfluid.solve.system import conjugate_gradients
+from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver, SolveReport
 
 POOR_RESIDUAL = 0.02
@@ -56,13 +58,18 @@ class Simulation:
         The forces `first` act in the first step too.
         """
         yield SimulatedFrame(self.now, None)
-        per_frame, timeline = self.timeline.steps_per_frame, self.timeline
+        per_frame = self.timeline.steps_per_frame
+        take_first, take = (
+            steps_of(self.solver, self.timeline, acting) for acting in ([*forces, *first], forces)
+        )
+
+        def advance(state_in: State, state_out: State, step: int) -> None:
+            (take if step else take_first)(state_in, state_out, step)
+
+        steps = march(self.now, self.spare, range(frames * per_frame), advance)
         for index in range(1, frames + 1):
-            for step in range((index - 1) * per_frame, index * per_frame):
-                acting = [*forces, *first] if step == 0 else forces
-                start, end = timeline.time_of(step), timeline.time_of(step + 1)
-                self.solver.step(self.now, self.spare, acting, start, timeline.dt, until=end)
-                self.now, self.spare = self.spare, self.now
+            for self.now, self.spare in islice(steps, per_frame):
+                pass  # to the next frame
             solve = self.solver.report()
             self._warned = _judge(solve, self.solver.fluid, index, self._warned)
             yield SimulatedFrame(self.now, solve)

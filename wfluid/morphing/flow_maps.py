@@ -16,7 +16,9 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import Timeline
 from wfluid.domain.walls import Walls
 from wfluid.fields.arrays import clone, copy
+from wfluid.fields.state import State
 from wfluid.model.force import Force
+from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 
@@ -69,23 +71,26 @@ def _between(maps: np.ndarray, part: float | np.ndarray) -> np.ndarray:
 
 def flow_maps(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> FlowMaps:
     """Run a flow from rest, and back: its maps after every step."""
-    now, spare, walls = solver.rest(), solver.rest(), solver.fluid.walls
+    walls, steps = solver.fluid.walls, range(timeline.steps)
     shape = (timeline.steps + 1, solver.grid.ny, solver.grid.nx, 2)
     from_start, to_end = (np.zeros(shape, dtype=np.float32) for _ in range(2))
     velocities = []
-    for step in range(timeline.steps):
+    forward = steps_of(solver, timeline, forces)
+
+    def there(now: State, then: State, step: int) -> None:
         velocities.append([clone(f) for f in (now.u, now.v)])
-        t, until = timeline.time_of(step), timeline.time_of(step + 1)
-        solver.step(now, spare, forces, t, timeline.dt, until=until)
-        now, spare = spare, now
+        forward(now, then, step)
+
+    def back(now: State, then: State, step: int) -> None:
+        for f, kept in zip((now.u, now.v), velocities.pop(), strict=True):
+            copy(kept, f)
+        solver.carry(now, then, -timeline.dt)
+
+    for step, (now, _) in zip(steps, march(solver.rest(), solver.rest(), steps, there), strict=True):
         from_start[step + 1] = CoordinateMap.of_state(now, walls).displacement
     if not np.all(np.isfinite(from_start[-1])):
         raise FloatingPointError("the flow is no longer finite; use smaller forces or more steps")
-    now, spare = solver.rest(), solver.rest()
-    for step in reversed(range(timeline.steps)):
-        for f, kept in zip((now.u, now.v), velocities.pop(), strict=True):
-            copy(kept, f)
-        solver.carry(now, spare, -timeline.dt)
-        now, spare = spare, now
+    backward = steps[::-1]
+    for step, (now, _) in zip(backward, march(solver.rest(), solver.rest(), backward, back), strict=True):
         to_end[step] = CoordinateMap.of_state(now, walls).displacement
     return FlowMaps(solver.grid, walls, from_start, to_end)

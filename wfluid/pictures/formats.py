@@ -10,7 +10,7 @@ from wfluid.domain.limits import QUALITY_LIMIT, TYPES
 from wfluid.system.errors import FileError
 
 LARGEST = 65504.0
-"""The largest half, which replaces infinite values on reading: filters would spread them as NaN."""
+"""Largest number of type half. It replaces infinite values on reading, which filters would turn into NaN."""
 
 NUMPY = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
 WRITES = {
@@ -44,7 +44,7 @@ LINEAR = ("half", "float")
 
 
 class PictureError(FileError):
-    """A picture that cannot be read or written; the message says which, why and what to do."""
+    """A picture that cannot be read or written; the message names the file, the reason and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ class Encoding:
             raise PictureError(f"quality {self.quality}: expected 1 … {QUALITY_LIMIT}")
 
     def check(self, path: Path) -> None:
-        """Refuse settings that the format of `path` does not support.
+        """Check the settings against the format of `path`.
 
         Raises:
-            PictureError: an unknown ending, or an unsupported setting, with the supported ones.
+            PictureError: an unknown ending, or an unsupported setting; the message lists the supported ones.
         """
         ending = path.suffix.lower()
         if ending not in WRITES:

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, Oscillator, product
+from wfluid.domain.envelopes import Arbitrary, Constant, Envelope, Fade, product
 from wfluid.domain.limits import IMAGE_BLUR, IMAGE_LENGTH, NOISE_SCALE, RADIUS
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.paths import Center, Path
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import GaussianForce, Growth, VortexForce

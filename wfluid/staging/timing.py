@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from wfluid.domain.envelopes import Constant, Envelope, Fade, Instantaneous, Oscillator
+from wfluid.domain.envelopes import Constant, Envelope, Fade, Instantaneous
 from wfluid.domain.limits import LEAST_TIME
+from wfluid.domain.oscillator import Oscillator
 from wfluid.scene.forces import LOOP_PHASE, PHASE, Impulse, Ramps, Wave, Window
 
 PAPER_PHASE = 0.0

@@ -1,4 +1,4 @@
-"""Steps fluids: plans each step, captures it as a graph, replays it, and says what its solves left."""
+"""Steps fluids: plans each step, captures it as a graph, replays it, and reports its residuals."""
 
 from __future__ import annotations
 
@@ -24,50 +24,50 @@ from wfluid.step.forcing import Forcing
 from wfluid.step.step import Step
 
 REPLAYS_KEPT = 16
-"""Pairs of states whose steps are kept captured; the oldest goes first."""
+"""Number of captured steps that are kept; the one that was used least recently is dropped first."""
 
 
 @dataclass(frozen=True)
 class SolveReport:
-    """What the last step's solves left."""
+    """The residuals of the last step's solves."""
 
     pressure: Residual
-    """Of the projection: the divergence left, as iterations and norms."""
+    """Of the projection: iterations, and norms of the remaining divergence."""
     diffusion: Residual
-    """Of the diffusion, relative to the change it made; of u alone where the components are apart."""
+    """Of the diffusion, relative to the change it made; of u only, where u and v are solved separately."""
     divergence: float
-    """Largest |div v| left, beside what is prescribed [1/s]."""
+    """Largest |div v - s| after the step, s the prescribed divergence [1/s]."""
     prescribed: float = 0.0
-    """Sum of the largest divergences that sources prescribed [1/s]."""
+    """Sum of the largest divergences that growths prescribed [1/s]."""
     removed: float = 0.0
-    """The mean of what they prescribed, taken off everywhere: it has no place between walls [1/s]."""
+    """Mean of the prescribed divergence, subtracted everywhere: walls and seams let no volume out [1/s]."""
 
 
 class Solver:
-    """Steps fluids of one grid and one kind on one device.
+    """Steps one fluid on one grid and device.
 
-    Building one loads the kernels. For each pair of states stepped between, the step is captured as
-    a graph and replayed from then on; the time, the step and the forces' numbers are read from device
-    memory. On a CPU with free cores two threads share the rows of every stage, with the same bits as one. A
-    solver is for one thread at a time; several may each have their own.
+    The constructor loads the kernels. For each pair of states, the first step from one to the other is
+    captured as a graph, which later steps replay: they read the step's length and the forces' numbers from
+    device memory. On a CPU with free cores two threads share the rows of every stage; the results have the
+    same bits as with one. One thread at a time may use a solver; other threads may use solvers of their own.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        self._stages = Step(grid, fluid, device)
-        self._last_dt = 0.0
+        self._step = Step(grid, fluid, device)
+        self._last_dt, self._prescribed = 0.0, 0.0
         self._preparation: CapturedGraph | None = None
-        self._impulses: dict[tuple, Forcing] = {}
-        self._last_impulses: Forcing | None = None
+        self._forcings: dict[tuple, Forcing] = {}
+        self._last_forcing: Forcing | None = None
         self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
-        self._pool = self._stages.helpers()
+        self._pool = self._step.helpers()
 
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
-        """A new state: a still fluid under an untouched picture, with its densities as they begin.
+        """A new state: fluid at rest, undistorted picture, initial densities.
 
-        `points` (n, 2) are places x, y of the picture [longer side] that are followed.
+        `points` (n, 2) are positions x, y in the picture [longer side] that the flow moves along.
 
         Raises:
             ValueError: points that are not (n, 2) finite numbers within the picture.
@@ -77,8 +77,8 @@ class Solver:
             points.ndim != 2 or points.shape[1] != 2 or not np.all((points >= 0) & (points <= extent))
         ):
             raise ValueError("points: expected x, y within the picture for each")
-        state = State.at_rest(self.grid, self.device, len(self._stages.densities), len(points))
-        for density, rho in zip(self._stages.densities, state.rho, strict=True):
+        state = State.at_rest(self.grid, self.device, len(self._step.densities), len(points))
+        for density, rho in zip(self._step.densities, state.rho, strict=True):
             density.begin(rho)
         if points.size:
             assign(points[:, 0] / self.grid.hx, state.p_x)
@@ -86,18 +86,18 @@ class Solver:
         return state
 
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
-        """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        """Set the face velocities of `state`: u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
         self._check(state)
-        for values, f, ghosts in zip((u, v), (state.u, state.v), self._stages.velocity_ghosts, strict=True):
+        for values, f, ghosts in zip((u, v), (state.u, state.v), self._step.velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
             ghosts.fill(f)
         fill(0.0, state.q)
 
     def set_map(self, state: State, displacement: np.ndarray) -> None:
-        """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
+        """Set the map of `state` from its displacement (ny, nx, 2) [longer side]."""
         self._check(state)
         cells = displacement / (self.grid.hx, self.grid.hy)
-        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._stages.moved_ghosts, strict=True)):
+        for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._step.moved_ghosts, strict=True)):
             from_numpy(cells[..., n], f, self.layout)
             ghosts.fill(f)
 
@@ -113,12 +113,12 @@ class Solver:
     ) -> None:
         """Advance `state_in` at time t by dt into `state_out`, another state.
 
-        Forces act from t to `until`: t + dt unless the very number is given at which the next step
-        begins, so that rounding lets no instant fall between two steps.
+        Forces act from t to `until`, by default t + dt. Give the exact number at which the next step begins:
+        then rounding leaves no gap between two steps.
 
         Raises:
-            ValueError: dt negative, not finite or above 10 s; the two states are one, or of another grid
-                or device; a force whose impulse is not finite or beyond the limit.
+            ValueError: dt negative, not finite or above 10 s; the two states are the same, or of another
+                grid or device; a force whose impulse is not finite or beyond the limit.
         """
         if not (math.isfinite(dt) and 0 <= dt <= STEP_LIMIT):
             raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
@@ -137,84 +137,81 @@ class Solver:
         dt: float,
         until: float,
     ) -> CapturedGraph:
-        """The step, captured at first, with its numbers put where it reads them."""
-        stages, impulses = self._stages, self._impulses_for(forces)
-        last = self._last_impulses
-        swelled = last is not None and last.prescribed > 0
-        impulses.set(forces, self.fluid, t, dt, until, stages.kept(dt, self._last_dt, swelled))
-        self._last_impulses, self._last_dt = impulses, dt
-        plan = stages.plan(until, dt, self._prepare)
-        key = (id(state_in), id(state_out), id(impulses), plan)
+        """The captured step, its numbers uploaded to device memory."""
+        step, forcing = self._step, self._forcing_for(forces)
+        pressure_part = step.pressure_part(dt, self._last_dt, self._prescribed > 0)
+        self._prescribed = forcing.set(forces, self.fluid, t, dt, until, pressure_part)
+        self._last_forcing, self._last_dt = forcing, dt
+        plan = step.plan(until, dt, self._prepare)
+        key = (id(state_in), id(state_out), id(forcing), plan)
         if key not in self._replays:
-            work = partial(stages.advance, state_in, state_out, impulses)
+            work = partial(step.advance, state_in, state_out, forcing)
             replay = CapturedGraph(self.device, work, self._pool)
-            self._replays[key] = (replay, state_in, state_out, impulses)
+            self._replays[key] = (replay, state_in, state_out, forcing)
             if len(self._replays) > REPLAYS_KEPT:
                 del self._replays[next(iter(self._replays))]
         self._replays[key] = self._replays.pop(key)  # the newest last
         return self._replays[key][0]
 
     def _prepare(self) -> None:
-        """Bring what depends on the medium up to date."""
+        """Replay `Step.update_coefficients`."""
         if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self._stages.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self._step.update_coefficients, self._pool)
         self._preparation.launch()
 
     def report(self) -> SolveReport:
-        """Measure what the last step's solves left: true residuals and the divergence."""
-        stages = self._stages
-        pressure, divergence = stages.projection.measure()
-        prescribed, removed = 0.0, 0.0
-        if self._last_impulses:
-            prescribed, removed = self._last_impulses.prescribed, self._last_impulses.removed
-        return SolveReport(pressure, stages.diffusion.measure(), divergence, prescribed, removed)
+        """Measure the true residuals and the divergence of the last step."""
+        step = self._step
+        pressure, divergence = step.projection.measure()
+        removed = self._last_forcing.removed if self._last_forcing else 0.0
+        return SolveReport(pressure, step.diffusion.measure(), divergence, self._prescribed, removed)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
-        """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
+        """Only carry the map along `state_in`'s velocity for dt, which may be negative.
 
-        The velocity of `state_out` is untouched.
+        The velocity of `state_out` does not change.
         """
         self._check(state_in, state_out)
-        impulses = self._impulses_for(())
-        impulses.set((), self.fluid, 0.0, dt, dt)
-        self._stages.trace(state_in, impulses)
-        self._stages.carry_map(state_in, state_out)
+        forcing = self._forcing_for(())
+        forcing.set((), self.fluid, 0.0, dt, dt)
+        foot = self._step.trace(state_in, forcing)
+        self._step.carry_map(state_in, foot, state_out)
 
     def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
-        """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
+        """Only diffuse the velocity for dt, from time t on. The map of `state_out` does not change."""
         self._check(state_in, state_out)
-        stages = self._ready(state_in, t + dt, dt)
-        for f, out in zip(stages.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
+        step = self._ready(state_in, t + dt, dt)
+        for f, out in zip(step.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
             copy(f, out)
 
     def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
-        """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
+        """Only project the velocity, as in a step of dt. The map of `state_out` does not change."""
         self._check(state_in, state_out)
-        stages = self._ready(state_in, 0.0, dt)
-        stages.project((state_in.u, state_in.v), (state_out.u, state_out.v))
+        step = self._ready(state_in, 0.0, dt)
+        step.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
     def _ready(self, state: State, t: float, dt: float) -> Step:
-        """The stages, ready for one of them alone."""
-        self._stages.plan(t, dt, self._prepare)
+        """The step, set up so that a single stage can run."""
+        self._step.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
-            self._stages.follow_medium(state)
-        return self._stages
+            self._step.update_coefficients(state)
+        return self._step
 
     def _check(self, *states: State) -> None:
-        """Refuse states whose arrays are not this solver's size, or not on its device."""
+        """Refuse states of another grid or device, or with other numbers of densities or points."""
         for state in states:
             if state.grid != self.grid or state.u.device != self.device:
                 raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")
-            if len(state.rho) != len(self._stages.densities) or len(state.p_x) != len(states[0].p_x):
+            if len(state.rho) != len(self._step.densities) or len(state.p_x) != len(states[0].p_x):
                 raise ValueError(
                     f"a state with {len(state.rho)} densities and {len(state.p_x)} points: expected "
-                    f"{len(self._stages.densities)} and {len(states[0].p_x)}"
+                    f"{len(self._step.densities)} and {len(states[0].p_x)}"
                 )
 
-    def _impulses_for(self, forces: Sequence[Force]) -> Forcing:
+    def _forcing_for(self, forces: Sequence[Force]) -> Forcing:
         key = Forcing.key(forces)
-        if key not in self._impulses:
-            if len(self._impulses) >= REPLAYS_KEPT:
-                del self._impulses[next(iter(self._impulses))]
-            self._impulses[key] = Forcing(forces, self.fluid, self.grid, self.device)
-        return self._impulses[key]
+        if key not in self._forcings:
+            if len(self._forcings) >= REPLAYS_KEPT:
+                del self._forcings[next(iter(self._forcings))]
+            self._forcings[key] = Forcing(forces, self.fluid, self.grid, self.device)
+        return self._forcings[key]
