@@ -35,7 +35,7 @@ FLOOR = {name: number for number, names in enumerate(FLOORS, start=1) for name i
 @pytest.mark.parametrize("name", [name for name in wfluid.__all__ if name != "__version__"])
 def test_every_public_name_exists_and_is_documented(name):
     thing = getattr(wfluid, name)
-    assert thing is getattr(import_module(wfluid._HOMES[name]), name)
+    assert thing is getattr(import_module(wfluid._homes()[name]), name)
     assert inspect.getdoc(thing)
     if inspect.isclass(thing):
         for attribute, value in vars(thing).items():

@@ -12,29 +12,35 @@ One unit of length is the picture's longer side, one unit of time a second; x po
 
 from __future__ import annotations
 
-import ast
-import pathlib
+from functools import cache
 from importlib import import_module
 from typing import Any
 
-_HOMES = {
-    alias.name: node.module
-    for node in ast.parse(pathlib.Path(__file__).with_suffix(".pyi").read_text()).body
-    if isinstance(node, ast.ImportFrom) and node.module
-    for alias in node.names
-}
-"""The module of each public name: the imports of __init__.pyi, which type checkers read too."""
-
 __version__ = "0.1.0"
-__all__ = ["__version__", *_HOMES]
+
+
+@cache
+def _homes() -> dict[str, str]:
+    """The module of each public name: the imports of __init__.pyi, which type checkers read too."""
+    import ast
+    import pathlib
+
+    return {
+        alias.name: node.module
+        for node in ast.parse(pathlib.Path(__file__).with_suffix(".pyi").read_text()).body
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used: `import wfluid` loads neither Warp nor OpenImageIO."""
-    if name not in _HOMES:
+    if name == "__all__":
+        return ["__version__", *_homes()]
+    if name not in _homes():
         raise AttributeError(f"module 'wfluid' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_homes()[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(["__version__", *_homes()])

@@ -13,8 +13,8 @@ from wfluid.domain.envelopes import Constant as Constant
 from wfluid.domain.envelopes import Envelope as Envelope
 from wfluid.domain.envelopes import Fade as Fade
 from wfluid.domain.envelopes import Instantaneous as Instantaneous
-from wfluid.domain.envelopes import Oscillator as Oscillator
 from wfluid.domain.grid import Grid as Grid
+from wfluid.domain.oscillator import Oscillator as Oscillator
 from wfluid.domain.paths import Path as Path
 from wfluid.domain.timeline import Timeline as Timeline
 from wfluid.domain.walls import Wall as Wall

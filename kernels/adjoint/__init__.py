@@ -1,4 +1,4 @@
-"""The transposes of the stages."""
+"""Transposes of the stages of a step and of the look-up."""
 
 from wfluid.kernels.adjoint import (
     advection,

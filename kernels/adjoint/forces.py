@@ -1,12 +1,12 @@
-"""The adjoint of forces and sources (`forces`, `sources`): gradients with respect to a Gaussian's numbers.
+"""The adjoint of forces and sources (`step/forces`, `step/sources`): gradients with respect to Gaussians.
 
-All that a Gaussian g about c with radius sigma adds to a field is a polynomial of r = (x - c) / sigma
-times g, and so are the derivatives with respect to c, sigma and its strengths. So with F the gradient with
-respect to the field, the moments
+A Gaussian g of centre c and radius sigma adds a polynomial of r = (x - c) / sigma times g to a field. The
+derivatives with respect to c, sigma and the strengths have the same form. With f_bar the gradient with
+respect to the field, they are linear combinations of the moments
 
-    M_ab = sum over the points of  F r_x^a r_y^b g        a + b <= 4
+    M_ab = sum over the points of  f_bar r_x^a r_y^b g        a + b <= 4
 
-are all that is needed (`wfluid.blobs` puts them together); they are summed along rows first.
+(`wfluid/step/gaussians`), which are summed along rows first.
 """
 
 import warp as wp
@@ -19,10 +19,10 @@ from wfluid.kernels.step.differences import mean_f
 from wfluid.kernels.step.forces import in_profile
 
 ORDERS = wp.constant(5)
-"""Powers of r that occur: 0 … 4."""
+"""Number of powers of r: 0 … 4."""
 
 MOMENTS = wp.constant(15)
-"""Pairs of powers a, b with a + b <= 4, in the order of a, then b."""
+"""Number of pairs of powers a, b with a + b <= 4, in the order of a, then b."""
 
 
 @adjoint_lines
@@ -38,7 +38,7 @@ def row_moments(
     # outputs
     sums: Field,
 ):
-    """Sums over the box's columns of F r_x^a g_x, for row t % ny and Gaussian t // ny."""
+    """sums[t, a] = sum of f_bar r_x^a g_x over the box's columns, of row t % ny and Gaussian t // ny."""
     n = t // ny
     j = t - n * ny
     first = boxes[4 * n]
@@ -51,8 +51,8 @@ def row_moments(
         sum4 = Lane()
         row = index(0, j, pitch)
         table = in_profile(n, 0, pitch_x)
-        whole = (end - first) // LANES * LANES + first
-        for i in range(first, whole, LANES):
+        lanes_end = (end - first) // LANES * LANES + first
+        for i in range(first, lanes_end, LANES):
             for lane in range(LANES):
                 r = r_x[table + i + lane]
                 value = f_bar[row + i + lane] * g_x[table + i + lane]
@@ -61,7 +61,7 @@ def row_moments(
                 sum2[lane] += value * r * r
                 sum3[lane] += value * r * r * r
                 sum4[lane] += value * r * r * r * r
-        for i in range(whole, end):
+        for i in range(lanes_end, end):
             r = r_x[table + i]
             value = f_bar[row + i] * g_x[table + i]
             sum0[0] += value
@@ -69,12 +69,12 @@ def row_moments(
             sum2[0] += value * r * r
             sum3[0] += value * r * r * r
             sum4[0] += value * r * r * r * r
-        at = ORDERS * t
-        sums[at] = total_of_lanes(sum0)
-        sums[at + 1] = total_of_lanes(sum1)
-        sums[at + 2] = total_of_lanes(sum2)
-        sums[at + 3] = total_of_lanes(sum3)
-        sums[at + 4] = total_of_lanes(sum4)
+        entry_0 = ORDERS * t
+        sums[entry_0] = total_of_lanes(sum0)
+        sums[entry_0 + 1] = total_of_lanes(sum1)
+        sums[entry_0 + 2] = total_of_lanes(sum2)
+        sums[entry_0 + 3] = total_of_lanes(sum3)
+        sums[entry_0 + 4] = total_of_lanes(sum4)
 
 
 @adjoint_lines
@@ -89,14 +89,14 @@ def moments(
     # outputs
     out: Field,
 ):
-    """The moments of Gaussian t: the sums over its rows of those along them, times r_y^b g_y."""
-    at = MOMENTS * t
+    """out[t, m] = sum of sums r_y^b g_y over the box's rows: moment m = (a, b) of Gaussian t."""
+    entry_0 = MOMENTS * t
     for m in range(MOMENTS):
-        out[at + m] = Real(0.0)
+        out[entry_0 + m] = Real(0.0)
     for j in range(boxes[4 * t + 2], boxes[4 * t + 3]):
         y = in_profile(t, j, pitch_y)
         row = ORDERS * (t * ny + j)
-        m = at
+        m = entry_0
         for a in range(ORDERS):
             value = sums[row + a] * g_y[y]
             for _b in range(ORDERS - a):
@@ -117,7 +117,10 @@ def lift_adjoint(
     # outputs
     rho_bar: Field,
 ):
-    """The transpose of `lift` with respect to the density; adds to it, but not to ghosts."""
+    """rho_bar += impulse (u_bar[k] + u_bar[k + before]) / 2 at centre k: the transpose of `lift`, in place.
+
+    Ghosts of rho_bar stay as they are.
+    """
     k = inside(k)
     both = u_bar[k] + u_bar[inside(k + before)]
     rho_bar[k] = rho_bar[k] + wp.where(i < nx, impulse * Real(0.5) * both, Real(0.0))
@@ -133,7 +136,7 @@ def mean_with_before(
     # outputs
     out: Field,
 ):
-    """What `lift` multiplies by its impulse: the mean on both sides of face k."""
+    """out = (rho[k - before] + rho[k]) / 2 on face k, which `lift` multiplies by its impulse."""
     k = inside(k)
     out[k] = mean_f(rho, k, before)
 
@@ -149,7 +152,10 @@ def weighted(
     # outputs
     out: Field,
 ):
-    """The transpose of `push_weighted` with respect to what is weighted; of `weigh` with `before` = 0."""
+    """out = (weight[k - before] + weight[k]) / 2 f_bar on face k: the transpose of `push_weighted`.
+
+    With `before` = 0 it is weight f_bar at centre k.
+    """
     k = inside(k)
     out[k] = mean_f(weight, k, before) * f_bar[k]
 
@@ -166,6 +172,8 @@ def effort_added(
     # outputs
     out: Field,
 ):
-    """out = f_bar + factor (pushed - f): with the gradient of half the square of what forces gained."""
+    """out = f_bar + factor (pushed - f): adds the gradient of factor |pushed - f|^2 / 2, the effort of
+    forces.
+    """
     k = inside(k)
     out[k] = f_bar[k] + factor * (pushed[k] - f[k])

@@ -1,4 +1,4 @@
-"""The transpose of filling ghosts: their gradients go to the cells they copy."""
+"""The transpose of filling ghosts: gradients of ghosts are added to those of the cells that they copy."""
 
 from wfluid.kernels.cell.program import adjoint_lines
 from wfluid.kernels.cell.real import Field, Indices, Real
@@ -14,9 +14,9 @@ def fold_columns(
     # outputs
     f_bar: Field,
 ):
-    """The transpose of `fill` along column t (counted with the halo): ghosts add to their sources.
+    """f_bar[source] += sign f_bar[ghost], f_bar[ghost] = 0 along column t, counted with the halo, in place.
 
-    They themselves come out as 0, and so do faces on a wall.
+    Faces on a wall are set to 0 too.
     """
     for m in range(5):
         j = m
@@ -37,12 +37,12 @@ def fold_rows(
     # outputs
     f_bar: Field,
 ):
-    """The same along row t, after all columns."""
-    at = (t + 2) * pitch
+    """f_bar[source] += sign f_bar[ghost], f_bar[ghost] = 0 along row t, in place; after all columns."""
+    row = (t + 2) * pitch
     for m in range(5):
         i = m
         if m > 2:
             i = nx + m - 1
-        ghost = f_bar[at + i]
-        f_bar[at + i] = Real(0.0)
-        f_bar[at + column_source[i]] += column_sign[i] * ghost
+        ghost = f_bar[row + i]
+        f_bar[row + i] = Real(0.0)
+        f_bar[row + column_source[i]] += column_sign[i] * ghost

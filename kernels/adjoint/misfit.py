@@ -19,7 +19,7 @@ def weigh_misfit(
     # outputs
     shown_bar: Pixels,
 ):
-    """The gradient of half the weighted squares of shown - target with respect to pixel k."""
+    """shown_bar = weight (shown - target) at pixel k: the gradient of 1/2 sum weight |shown - target|^2."""
     k = inside(k)
     shown_bar[k] = weight[k] * (shown[k] - target[k])
 
@@ -36,12 +36,12 @@ def row_misfits(
     # outputs
     rows: Field,
 ):
-    """Entry first + t: the sum of weight |shown - target|^2 over row t of the pixels, all four channels."""
-    at = index(0, t, pitch)
+    """rows[first + t] = the sum of weight |shown - target|^2 over row t of the pixels, all four channels."""
+    row = index(0, t, pitch)
     total = Pixel()
     for i in range(nx):
-        left = shown[entry(at + i)] - target[entry(at + i)]
-        total += weight[entry(at + i)] * wp.cw_mul(left, left)
+        residual = shown[entry(row + i)] - target[entry(row + i)]
+        total += weight[entry(row + i)] * wp.cw_mul(residual, residual)
     rows[first + t] = total[0] + total[1] + total[2] + total[3]
 
 
@@ -54,12 +54,12 @@ def misfit(
     target: Field,
     weight: Field,
     # outputs
-    left: Field,
+    residual: Field,
     weighted: Field,
 ):
-    """What is left of f at point k, and that times its weight."""
+    """residual = f - target and weighted = weight (f - target) at point k."""
     k = inside(k)
-    left[k] = f[k] - target[k]
+    residual[k] = f[k] - target[k]
     weighted[k] = weight[k] * (f[k] - target[k])
 
 
@@ -74,10 +74,10 @@ def row_squares(
     # outputs
     rows: Field,
 ):
-    """Entry first + t: the sum of (f - target)^2 over row t."""
-    at = index(0, t, pitch)
+    """rows[first + t] = the sum of (f - target)^2 over row t."""
+    row = index(0, t, pitch)
     total = Real(0.0)
     for i in range(nx):
-        left = f[at + i] - target[at + i]
-        total += left * left
+        residual = f[row + i] - target[row + i]
+        total += residual * residual
     rows[first + t] = total

@@ -1,21 +1,21 @@
-"""Scatter: the transpose of an interpolation. Each cell adds to the points around the place it was read at.
+"""Scatter: the transpose of an interpolation. Each cell adds to the points around its foot.
 
-    f_bar[at - 1 + q + (r - 1) pitch] += w_q(tx) w_r(ty) out_bar[k]        cubic: q, r = 0 … 3
+    f_bar[corner - 1 + q + (r - 1) pitch] += w_q(tx) w_r(ty) out_bar[k]        cubic: q, r = 0 … 3
 
-Neighbouring cells mostly read at neighbouring places: `at` - k is one number, or a few, over a span. For
-each such number what all its cells add to a row is a sum of products of shifted arrays, so that on a CPU
-a span adds whole rows at a time, vectorised, instead of sixteen times a cell to an address that the cell
-before has just written. What is left after a few such numbers is added cell by cell. The order of the
-additions is fixed, hence so are the bits; on CUDA each cell adds atomically.
+The feet of neighbouring cells are mostly neighbours too: the shift `corner` - k has one value, or a few, over
+a span. On a CPU all cells of one shift are added together, row by row: each row of the sum is a sum of
+products of shifted arrays, which vectorises. Cell by cell it would be sixteen additions, each to an address
+that the cell before has just written. Cells whose shift is not among the first few are added cell by cell.
+The order of the additions is fixed, hence so are the bits. On CUDA each cell adds atomically.
 """
 
 import warp as wp
 from wfluid.kernels.cell.layout import SPAN
-from wfluid.kernels.cell.program import adjoint_spans
+from wfluid.kernels.cell.program import Program, adjoint_spans
 from wfluid.kernels.cell.real import Field, Indices, Real
 
 SHIFTS = 6
-"""Numbers `at` - k of one span that are added row by row."""
+"""Shifts `corner` - k of one span whose cells are added row by row."""
 
 _WEIGHTS = {
     "cubic": """
@@ -50,7 +50,7 @@ def _scatter_source(kind: str) -> str:
     for (int r = 0; r < TAPS; ++r)
         for (int q = 0; q < TAPS; ++q)
             wp::atomic_add(
-                f_bar, at.data[k] + (r - REACH) * pitch + q - REACH, x[q] * y[r] * out_bar.data[k]);
+                f_bar, corner.data[k] + (r - REACH) * pitch + q - REACH, x[q] * y[r] * out_bar.data[k]);
 #else
     const wp::int32 cells = nx - i < SPAN ? nx - i : SPAN;
     alignas(64) real x[TAPS][SPAN + 2 * PAD] = {{}}, t[TAPS][SPAN + 2 * PAD] = {{}}, y[TAPS][SPAN];
@@ -59,7 +59,7 @@ def _scatter_source(kind: str) -> str:
         const bool cell = c < cells;
         const real a = cell ? tx.data[k + c] : 0, b = cell ? ty.data[k + c] : 0;
         const real bar = cell ? out_bar.data[k + c] : 0;
-        shift[c] = cell ? at.data[k + c] - c : NONE;
+        shift[c] = cell ? corner.data[k + c] - c : NONE;
         {all_x}
         {all_y}
         for (int r = 0; r < TAPS; ++r) y[r][c] *= bar;
@@ -84,61 +84,54 @@ def _scatter_source(kind: str) -> str:
     }}
     for (int c = first; c < cells; ++c) {{
         if (shift[c] == NONE) continue;
-        real* corner = f_bar.data + shift[c] + c - REACH * pitch - REACH;
+        real* first_tap = f_bar.data + shift[c] + c - REACH * pitch - REACH;
         for (int r = 0; r < TAPS; ++r)
-            for (int q = 0; q < TAPS; ++q) corner[r * pitch + q] += x[q][PAD + c] * y[r][c];
+            for (int q = 0; q < TAPS; ++q) first_tap[r * pitch + q] += x[q][PAD + c] * y[r][c];
     }}
 #endif
 """
 
 
 @wp.func_native(_scatter_source("cubic"))
-def scatter_span_cubic(
-    i: int, k: int, nx: int, at: Indices, tx: Field, ty: Field, out_bar: Field, pitch: int, f_bar: Field
+def scatter_cubic_span(
+    i: int, k: int, nx: int, corner: Indices, tx: Field, ty: Field, out_bar: Field, pitch: int, f_bar: Field
 ):
-    """Add what the cells of the span from i, k on read by cubics."""
+    """Scatter the span that begins with cell k, column i, with the weights of `interpolation.cubic`."""
     ...
 
 
 @wp.func_native(_scatter_source("bilinear"))
-def scatter_span_bilinear(
-    i: int, k: int, nx: int, at: Indices, tx: Field, ty: Field, out_bar: Field, pitch: int, f_bar: Field
+def scatter_bilinear_span(
+    i: int, k: int, nx: int, corner: Indices, tx: Field, ty: Field, out_bar: Field, pitch: int, f_bar: Field
 ):
-    """Add what the cells of the span from i, k on read bilinearly."""
+    """Scatter the span that begins with cell k, column i, with the weights of `interpolation.bilinear`."""
     ...
 
 
-@adjoint_spans
-def scatter_cubic(
-    i: int,
-    j: int,
-    k: int,
-    at: Indices,
-    tx: Field,
-    ty: Field,
-    out_bar: Field,
-    nx: int,
-    pitch: int,
-    # outputs
-    f_bar: Field,
-):
-    """The transpose of `advection.cubic`, tx and ty past point `at`; adds to f_bar."""
-    scatter_span_cubic(i, k, nx, at, tx, ty, out_bar, pitch, f_bar)
+def _scatter(scatter_span: wp.Function) -> Program:
+    @adjoint_spans
+    def scatter(
+        i: int,
+        j: int,
+        k: int,
+        corner: Indices,
+        tx: Field,
+        ty: Field,
+        out_bar: Field,
+        nx: int,
+        pitch: int,
+        # outputs
+        f_bar: Field,
+    ):
+        """f_bar[p] += w_p(tx, ty) out_bar[k] at the points p around the foot of point k, in place.
+
+        The foot lies tx and ty [cells] past entry `corner`[k] of f_bar; out_bar is the gradient with respect
+        to the value read there.
+        """
+        scatter_span(i, k, nx, corner, tx, ty, out_bar, pitch, f_bar)
+
+    return scatter
 
 
-@adjoint_spans
-def scatter_bilinear(
-    i: int,
-    j: int,
-    k: int,
-    at: Indices,
-    tx: Field,
-    ty: Field,
-    out_bar: Field,
-    nx: int,
-    pitch: int,
-    # outputs
-    f_bar: Field,
-):
-    """The transpose of `advection.bilinear`, tx and ty past point `at`; adds to f_bar."""
-    scatter_span_bilinear(i, k, nx, at, tx, ty, out_bar, pitch, f_bar)
+scatter_cubic = _scatter(scatter_cubic_span)
+scatter_bilinear = _scatter(scatter_bilinear_span)

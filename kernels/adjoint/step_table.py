@@ -1,8 +1,8 @@
-"""Tables of rows, one a step, in a loop whose steps are counted on the device.
+"""Tables with one row per step, in a loop whose steps are counted on the device.
 
-A graph bakes in pointers, so that one captured step serves a run of any length only if it finds by a number
-in device memory which state to begin with, what acts, and where to leave the next: step[0] is the row,
-step[1] where the loop ends. Rows are copied in chunks, one a line.
+A captured graph contains fixed pointers. One captured step therefore serves a run of any length only if a
+number in device memory selects the rows that hold its state and forces and that receive the next state:
+step[0] is the row, step[1] the row at which the loop ends. Rows are copied in chunks, one chunk per line.
 """
 
 import warp as wp
@@ -10,27 +10,27 @@ from wfluid.kernels.cell.program import adjoint_lines
 from wfluid.kernels.cell.real import Field, Indices
 
 _COPY = """
-    const long long begin = (long long)t * chunk, left = size - begin;
-    const long long count = left < chunk ? left : chunk;
+    const long long begin = (long long)t * chunk, rest = size - begin;
+    const long long count = rest < chunk ? rest : chunk;
     memcpy({to} + begin, {source} + begin, count * sizeof(*{to}));
 """
 
 
 @wp.func_native(_COPY.format(to="out.data", source="(table.data + (long long)row * size)"))
 def copy_from(t: int, table: Field, row: int, size: int, chunk: int, out: Field):
-    """Chunk t of a row of `size` entries."""
+    """Copy chunk t of a row of `size` entries."""
     ...
 
 
 @wp.func_native(_COPY.format(to="out.data", source="(table.data + (long long)row * size)"))
 def copy_indices_from(t: int, table: Indices, row: int, size: int, chunk: int, out: Indices):
-    """Chunk t of a row of `size` indices."""
+    """Copy chunk t of a row of `size` indices."""
     ...
 
 
 @wp.func_native(_COPY.format(to="(table.data + (long long)row * size)", source="f.data"))
 def copy_to(t: int, f: Field, row: int, size: int, chunk: int, table: Field):
-    """Chunk t of a row of `size` entries."""
+    """Copy chunk t of a row of `size` entries."""
     ...
 
 
@@ -45,7 +45,7 @@ def take(
     # outputs
     out: Field,
 ):
-    """out = the row that is `ahead` of the step's."""
+    """out = table[step + ahead], chunk t."""
     copy_from(t, table, step[0] + ahead, size, chunk, out)
 
 
@@ -60,7 +60,7 @@ def take_indices(
     # outputs
     out: Indices,
 ):
-    """out = the row that is `ahead` of the step's."""
+    """out = table[step + ahead], chunk t."""
     copy_indices_from(t, table, step[0] + ahead, size, chunk, out)
 
 
@@ -75,7 +75,7 @@ def give(
     # outputs
     table: Field,
 ):
-    """The row that is `ahead` of the step's = f."""
+    """table[step + ahead] = f, chunk t."""
     copy_to(t, f, step[0] + ahead, size, chunk, table)
 
 
@@ -88,7 +88,7 @@ def copy(
     # outputs
     out: Field,
 ):
-    """out = f."""
+    """out = f, chunk t."""
     copy_from(t, f, 0, size, chunk, out)
 
 
@@ -100,7 +100,7 @@ def count(
     step: Indices,
     going: Indices,
 ):
-    """Go on by so many rows; whether the end is still ahead."""
+    """step += by; going = 1 before the end of the loop, else 0."""
     step[0] = step[0] + by
     going[0] = int(step[0] != step[1])
 
@@ -115,5 +115,5 @@ def add_row(
     # outputs
     out: Field,
 ):
-    """Add entry t of the row that is `ahead` of the step's, in place."""
+    """out[t] += table[step + ahead, t], in place."""
     out[t] = out[t] + table[(step[0] + ahead) * size + t]

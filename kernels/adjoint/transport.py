@@ -1,7 +1,9 @@
-"""The adjoint of transport (`transport`): densities and points; the map's is `advection_adjoint`'s."""
+"""The adjoint of transport (`step/transport`) of densities and points; `adjoint/advection` has that of the
+map.
+"""
 
 import warp as wp
-from wfluid.kernels.adjoint.advection import bilinear_rises, cubic_rises
+from wfluid.kernels.adjoint.advection import bilinear_slopes_of, cubic_slopes_of
 from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
 from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
@@ -12,7 +14,7 @@ from wfluid.kernels.step.transport import velocity_at, within
 
 @wp.func
 def moves(i: int, offset: Real, n: int, periodic: int):
-    """1 where `locate` follows the offset, 0 where a wall stops it."""
+    """Derivative of the offset that `locate` takes: 1, or 0 beyond a ghost of a closed axis."""
     before = i + int(wp.floor(offset))
     free = periodic == 1 or (before >= -1 and before < n)
     return wp.where(free, Real(1.0), Real(0.0))
@@ -20,20 +22,20 @@ def moves(i: int, offset: Real, n: int, periodic: int):
 
 @wp.func
 def cubic_adjoint(f: Field, k: int, pitch: int, tx: Real, ty: Real, bar: Real, f_bar: Field):
-    """The transpose of `advection.cubic`: adds to f_bar; the gradients with respect to tx and ty."""
+    """The transpose of `interpolation.cubic`: adds to f_bar, returns the gradients of tx and ty."""
     wx = cubic_weights(tx)
     wy = cubic_weights(ty)
     for n in range(4):
         row = k + (n - 1) * pitch
         for m in range(4):
             f_bar[row + m - 1] += wx[m] * wy[n] * bar
-    along_x, along_y = cubic_rises(f, k, pitch, tx, ty)
+    along_x, along_y = cubic_slopes_of(f, k, pitch, tx, ty)
     return along_x * bar, along_y * bar
 
 
 @wp.func
 def bilinear_adjoint(f: Field, k: int, pitch: int, tx: Real, ty: Real, bar: Real, f_bar: Field):
-    """The transpose of `advection.bilinear`: adds to f_bar; the gradients with respect to tx and ty."""
+    """The transpose of `interpolation.bilinear`: adds to f_bar, returns the gradients of tx and ty."""
     sx = Real(1.0) - tx
     sy = Real(1.0) - ty
     south = k + pitch
@@ -41,7 +43,7 @@ def bilinear_adjoint(f: Field, k: int, pitch: int, tx: Real, ty: Real, bar: Real
     f_bar[k + 1] += tx * sy * bar
     f_bar[south] += sx * ty * bar
     f_bar[south + 1] += tx * ty * bar
-    along_x, along_y = bilinear_rises(f, k, pitch, tx, ty)
+    along_x, along_y = bilinear_slopes_of(f, k, pitch, tx, ty)
     return along_x * bar, along_y * bar
 
 
@@ -64,23 +66,27 @@ def carry_density_adjoint(
     x_bar: Field,
     y_bar: Field,
 ):
-    """The transpose of `carry_density`: where the limit holds it is one of the four points that counts."""
+    """The transpose of `carry_density`: adds to rho_bar; x_bar, y_bar = the gradient with respect to the
+    foot.
+
+    Where the value was limited, all of out_bar belongs to the least or the greatest of the four points.
+    """
     k = inside(k)
     if i < nx:
         x = foot_x[k]
         y = foot_y[k]
         column, tx = locate(i, x, nx, periodic_x)
         row, ty = locate(j, y, ny, periodic_y)
-        at = index(column, row, pitch)
-        least = at
-        most = at
+        first = index(column, row, pitch)
+        least = first
+        most = first
         for n in range(1, 4):
-            corner = at + n % 2 + n // 2 * pitch
+            corner = first + n % 2 + n // 2 * pitch
             if rho[corner] < rho[least]:
                 least = corner
             if rho[corner] > rho[most]:
                 most = corner
-        value = cubic(rho, at, pitch, tx, ty)
+        value = cubic(rho, first, pitch, tx, ty)
         along_x = Real(0.0)
         along_y = Real(0.0)
         if value < rho[least]:
@@ -88,7 +94,7 @@ def carry_density_adjoint(
         elif value > rho[most]:
             rho_bar[most] += out_bar[k]
         else:
-            along_x, along_y = cubic_adjoint(rho, at, pitch, tx, ty, out_bar[k], rho_bar)
+            along_x, along_y = cubic_adjoint(rho, first, pitch, tx, ty, out_bar[k], rho_bar)
         x_bar[k] = along_x * moves(i, x, nx, periodic_x)
         y_bar[k] = along_y * moves(j, y, ny, periodic_y)
 
@@ -112,15 +118,15 @@ def carried_along_adjoint(
     d_x_bar: Field,
     d_y_bar: Field,
 ):
-    """The transpose of `carried_along`; adds to all three."""
+    """The transpose of `carried_along`: adds to f_bar, d_x_bar and d_y_bar, in place."""
     k = inside(k)
     if i < nx:
         x = d_x[k]
         y = d_y[k]
         column, tx = locate(i, x, nx, periodic_x)
         row, ty = locate(j, y, ny, periodic_y)
-        at = index(column, row, pitch)
-        along_x, along_y = bilinear_adjoint(f, at, pitch, tx, ty, out_bar[k], f_bar)
+        first = index(column, row, pitch)
+        along_x, along_y = bilinear_adjoint(f, first, pitch, tx, ty, out_bar[k], f_bar)
         d_x_bar[k] += along_x * moves(i, x, nx, periodic_x)
         d_y_bar[k] += along_y * moves(j, y, ny, periodic_y)
 
@@ -141,7 +147,7 @@ def velocity_at_adjoint(
     u_bar: Field,
     v_bar: Field,
 ):
-    """The transpose of `velocity_at`: adds to u_bar and v_bar; the gradients with respect to x and y."""
+    """The transpose of `velocity_at`: adds to u_bar and v_bar, returns the gradients of x and y."""
     half = Real(0.5)
     face_column, face_tx = locate(0, x, nx, periodic_x)
     row, ty = locate(0, y - half, ny, periodic_y)
@@ -178,7 +184,7 @@ def carry_points_adjoint(
     x_bar: Field,
     y_bar: Field,
 ):
-    """The transpose of `carry_points`, which is run again on the way; adds to u_bar and v_bar."""
+    """The transpose of `carry_points`, which it recomputes: adds to u_bar and v_bar; sets x_bar and y_bar."""
     half = Real(0.5)
     u0, v0 = velocity_at(u, v, x[t], y[t], nx, ny, periodic_x, periodic_y, pitch)
     x1 = x[t] + half * dt_hx * u0

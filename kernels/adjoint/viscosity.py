@@ -1,8 +1,9 @@
 """The gradient with respect to viscosity (`solve/stress`, `solve/five_point`).
 
-With A v = b solved, and A lambda = v_bar, an objective changes with mu as -<lambda, (dA/dmu) v>.
-<lambda, A v> is the power that the stress of v would do on the flow lambda: mu times the product of their
-strains, normal ones at centres, shear ones at nodes. Only so far as both solves go is it right.
+With A v = b and A lambda = v_bar, the derivative of an objective with respect to mu is
+-<lambda, (dA/dmu) v>. <lambda, A v> is the power of the stress of v in the flow lambda: mu times the product
+of their strains, normal strains at centres and shear strains at nodes. The error of the gradient is that of
+both solves.
 """
 
 import warp as wp
@@ -14,7 +15,7 @@ from wfluid.kernels.step.differences import gradient_x, gradient_y, laplacian_c
 
 @wp.func
 def shear_n(u: Field, v: Field, k: int, pitch: int, over_hx: Real, over_hy: Real):
-    """Shear rate du/dy + dv/dx at the node where cell k begins."""
+    """du/dy + dv/dx [1/s] at the top left node of cell k: the shear rate."""
     return gradient_y(u, k, pitch, over_hy) + gradient_x(v, k, over_hx)
 
 
@@ -34,14 +35,14 @@ def take_dissipation(
     # outputs
     mu_bar: Field,
 ):
-    """Take dt times the strains of (u, v) times those of lambda off mu_bar, in place.
+    """mu_bar -= dt strain(v) : strain(lambda) at centre k, in place.
 
-    A centre has a quarter of each of its four nodes; what a node on a wall gives to its two cells beyond
-    it gives back to those inside, and so a quarter is right there too.
+    Each of the four nodes of a cell adds a quarter of its product. At a wall the ghosts of mu copy the cells
+    inside, which so get the quarters of the cells beyond: a quarter is right there too.
     """
     k = inside(k)
     south = inside(k + pitch)
-    # each strain of v is the factor of that of lambda: one product, in one order
+    # each strain of v is passed as the factor of the strain of lambda, which fixes the order of the product
     stretch_x = gradient_x(lambda_u, k + 1, gradient_x(u, k + 1, inverse_hx) * inverse_hx)
     stretch_y = gradient_y(lambda_v, south, pitch, gradient_y(v, south, pitch, inverse_hy) * inverse_hy)
     shears = Real(0.0)
@@ -68,6 +69,6 @@ def add_diffused(
     # outputs
     mu_bar: Field,
 ):
-    """Add lambda dt Lap f to mu_bar, in place, for one component and constant viscosity; a = 1 / h^2."""
+    """mu_bar += dt lambda_f Lap f at k, in place: one component, constant viscosity; a = 1 / h^2."""
     k = inside(k)
     mu_bar[k] = mu_bar[k] + lambda_f[k] * dt * laplacian_c(f, k, pitch, ax, ay)

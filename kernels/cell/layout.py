@@ -1,43 +1,45 @@
-"""Where a cell lies in a 1-D padded field."""
+"""The layout of a grid in a 1-D padded field."""
 
 from dataclasses import dataclass
 
 import warp as wp
 
 HALO = 2
-"""Ghost cells on each side of a field: what a cubic stencil at a wall reaches."""
+"""Ghost cells on each side of a field: as many as a cubic stencil at a wall reads."""
 
 SPAN = 64
-"""Cells a CPU thread runs. Long enough to pay for the loop's entry, short enough that padding a row
-to a multiple of it stays cheap."""
+"""Cells that a CPU thread runs in one loop.
+
+Large, so that the start of the loop costs little; small, so that padding rows to a multiple of it does
+too."""
 
 
 def whole_spans(n: int) -> int:
-    """n rounded up to whole spans: the room a row, or a table over columns, takes."""
+    """n rounded up to a multiple of `SPAN`: the length of a row, or of a table over columns."""
     return -(-n // SPAN) * SPAN
 
 
 @wp.func
 def index(column: int, row: int, pitch: int):
-    """Where the cell in a column and a row lies in a field; both count from -`HALO` on."""
+    """Index in a field of the cell at a column and a row, from -`HALO` on; 2 is `HALO`."""
     return (row + 2) * pitch + column + 2
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the cell in row j, column i of an nx by ny grid lies in a 1-D field."""
+    """Layout of an nx by ny grid: the cell in column i, row j has index first + j pitch + i."""
 
     nx: int
     ny: int
 
     @property
     def pitch(self) -> int:
-        """Elements from one row to the next: whole spans and a halo on both sides."""
+        """Elements from one row to the next: nx rounded up to spans, and a halo on both sides."""
         return whole_spans(self.nx) + 2 * HALO
 
     @property
     def size(self) -> int:
-        """Elements of a field. One row more than the halo, for stencils that read ahead of it."""
+        """Elements of a field. After the halo one spare row, which stencils in the halo may read."""
         return (self.ny + 2 * HALO + 1) * self.pitch
 
     @property

@@ -1,8 +1,8 @@
-"""The lock of all calls of Warp that a capture would take in.
+"""The lock of all calls of Warp that a capture would record.
 
-A capture records whatever any thread launches, allocates, copies or writes meanwhile. So launches hold the
-lock (`cell/program`), and so do the functions that make and write arrays (`wfluid/fields/arrays`), and each
-capture from its beginning to its end (`wfluid/fields/graph`). Replays need none.
+A capture records all launches, allocations, copies and writes, of every thread. So launches hold the lock
+(`cell/program`), and so do the functions that make and write arrays (`wfluid/fields/arrays`), and each
+capture from its beginning to its end (`wfluid/fields/graph`). Replays need no lock.
 """
 
 import threading

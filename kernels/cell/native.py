@@ -1,4 +1,4 @@
-"""Promises to the compiler, without which loops over cells do not vectorise."""
+"""Assumptions for the compiler, without which loops over cells do not vectorise."""
 
 import warp as wp
 from wfluid.kernels.cell.real import PRECISION, Field, Real
@@ -6,17 +6,17 @@ from wfluid.kernels.cell.real import PRECISION, Field, Real
 
 @wp.func_native("__builtin_assume(k >= 4); return k;")
 def inside(k: int) -> int:
-    """Promise the compiler that k is a cell, never among the first elements of its field.
+    """k, with the assumption k >= 4: no cell is among the first elements of its field.
 
-    Warp wraps negative indices; the test for it stops the vectoriser. Apply it to the base of every
-    row touched; neighbours in the row follow as k - 1, k + 1.
+    Warp wraps negative indices, and its test for them stops the vectoriser. Apply this to the index in every
+    row that is read or written; its neighbours in the row are then k - 1, k + 1.
     """
     ...
 
 
 @wp.func_native("__builtin_assume(i >= 0); return i;")
 def entry(i: int) -> int:
-    """Promise the compiler that i, an entry of a table, is not negative."""
+    """i, with the assumption i >= 0: the index of an entry in a table."""
     ...
 
 
@@ -29,9 +29,9 @@ _BITS = {"float32": "wp::int32", "float64": "wp::int64"}[PRECISION]
     f"wp::{PRECISION} value; memcpy(&value, &bits, sizeof(value)); return value;"
 )
 def gather(f: Field, k: int) -> Real:
-    """f[k] at an address the compiler cannot foresee.
+    """f[k] at an address that is computed from data.
 
-    Reading through an integer lvalue proves that the read does not alias a store to a `Field`, so a
-    loop of gathers vectorises. Never use it on an array that the same kernel writes.
+    A read through an integer lvalue cannot alias a store to a `Field`, so a loop of gathers vectorises. Never
+    use it on an array that the same kernel writes.
     """
     ...

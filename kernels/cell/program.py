@@ -14,14 +14,16 @@ neighbours are k - 1, k + 1, k - pitch, k + pitch. `cells` wraps the program int
   consecutive addresses, which LLVM vectorises (a plain 2-D Warp kernel runs 20 times slower);
 * a CUDA kernel in which a thread runs one cell.
 
-The last span of a row may run past it, into cells of the same row that `Layout` keeps free; what
-it leaves in ghost cells is overwritten when they are filled. All CPU kernels share one Warp module
-and all CUDA kernels another: a module costs four seconds to compile before its first kernel, and a
-device compiles only its own.
+The last span of a row may go past the end of the row, into its padding (`Layout`). It may write to ghost
+cells, which are filled afterwards. All CPU kernels share one Warp module and all CUDA kernels another: a
+module takes four seconds to compile before its first kernel, and a device compiles only its own module.
 
 A number that lives on the device, and so may change between replays of a captured graph, is
-annotated `Uniform`; a table with one entry a row is annotated `RowReal` or `RowIndex`. The kernel reads
-them once a span and the program sees a plain number.
+annotated `Uniform`; a table with one entry per row is annotated `RowReal` or `RowIndex`. The kernel reads
+it once per span, and the program gets a plain number.
+
+A function that takes device functions and returns a program of them makes variants from one source, such as
+advection with cubic and with bilinear interpolation (`step/advection`).
 """
 
 import inspect
@@ -36,15 +38,15 @@ from wfluid.kernels.cell.real import Field, Indices, Real, RowIndex, RowReal, Un
 from wfluid.kernels.cell.strips import Strip, share, strips_meet
 
 _HOISTED = {Uniform: (Real, Field, "0"), RowReal: (Real, Field, "j"), RowIndex: (wp.int32, Indices, "j")}
-"""Annotation: what the program receives, what the kernel takes, which entry it reads."""
+"""By annotation: the type in the program, the type in the kernel, the entry that the kernel reads."""
 
 CPU_FLAGS = (
     "-march=native -mprefer-vector-width=512 -ffp-contract=off"
     " -mllvm=-inline-threshold=9000 -mllvm=-inline-cold-callsite-threshold=3000"
 )
-"""Programs are inlined whole into their span loop, or the loop does not vectorise. Products are not
-fused into sums: it gains nothing here (the loops wait for memory), and without it every vector width,
-hence every CPU, computes the same bits."""
+"""All of a program is inlined into its loop over a span, or the loop does not vectorise. Products are not
+fused with sums: that gains no speed, as the loops wait for memory, and without it every vector width, hence
+every CPU, computes the same bits."""
 
 
 class Program:
@@ -70,8 +72,8 @@ class Program:
 
         A layered program runs for every n on the cells of its box: `boxes` holds, for each n, the
         first column, the column after the last, the first row and the row after the last. A program that
-        writes to cells of other rows is run by one thread of a CPU: with a `turn`, which tells programs
-        that several threads may run beside each other apart.
+        writes to cells of other rows is given a `turn`, the number of the one CPU thread that runs it;
+        programs with different numbers may run at the same time.
         """
         row, end = share(*(rows or (0, layout.ny)), turn)
         if row == end:
@@ -98,7 +100,7 @@ class Lines:
     def launch(
         self, lines: int, device: wp.Device, inputs: Sequence, outputs: Sequence, turn: int | None = None
     ) -> None:
-        """Run the function for t = 0 … lines - 1; `turn` as for a `Program`."""
+        """Run the function for t = 0 … lines - 1; `turn` as in `Program.launch`."""
         first, end = share(0, lines, turn)
         if first < end:
             wp.launch(
@@ -157,14 +159,14 @@ _LINES = """def {name}({signature}, first_: int):
 
 
 FORWARD, ADJOINT = "wfluid", "wfluid.adjoint"
-"""Modules: who never asks for a gradient never builds its kernels."""
+"""Names of the modules. Kernels of the adjoint are built only where a gradient is computed."""
 
 
 def cells(program: Callable, span: int = SPAN, module: str = FORWARD) -> Program:
-    """Make a program of (i, j, k, …) that runs once a cell, or of (n, i, j, k, …) once a layer and cell.
+    """Make a program of (i, j, k, …), run once per cell, or of (n, i, j, k, …), once per layer and cell.
 
-    A layered program runs on whole spans: it must do nothing beyond its box within them. Programs
-    outside this package name a module of their own, so that this one is not built again.
+    A layered program runs on all cells of a span that meets its box, so it must add 0 outside the box.
+    Programs outside this package name a module of their own, so that this one is not built again.
     """
     layered = next(iter(inspect.signature(program).parameters)) == "n"
     template = _LAYERS if layered else _CELLS
@@ -175,14 +177,14 @@ def cells(program: Callable, span: int = SPAN, module: str = FORWARD) -> Program
 
 
 def adjoint_spans(program: Callable) -> Program:
-    """A program of the adjoint that runs once a span, from its first cell on; on CUDA once a cell."""
+    """A program of the adjoint that runs once per span, from its first cell on; on CUDA once per cell."""
     spans = {"cpu": SPAN, "cuda": 1}
     func, kernels = _kernels(program, skip=3, template=_SPANS, spans=spans, module=ADJOINT)
     return Program(func, kernels, SPAN)
 
 
 def lines(program: Callable, module: str = FORWARD) -> Lines:
-    """Make a function of (t, …) that runs once a line, one a thread on every device."""
+    """Make a function of (t, …) that runs once per line, with one thread for each line on every device."""
     return Lines(_kernels(program, skip=1, template=_LINES, spans={"cpu": 1, "cuda": 1}, module=module)[1])
 
 
@@ -206,11 +208,12 @@ def _kernels(program, skip, template, spans, module):
         "arguments": ", ".join(f"{p.name}_0" if p.name in hoisted else p.name for p in parameters),
         "hoisted": "\n".join(f"    {name}_0 = {name}[{entry}]" for name, (_, _, entry) in hoisted.items()),
     }
+    program_name = _name(program)
     kernels = {}
     for kind, span in spans.items():
-        name = f"{program.__module__.rpartition('.')[2]}_{program.__name__}_{span}"
+        name = f"{program.__module__.rpartition('.')[2]}_{program_name}_{span}"
         source = template.format(name=name, **source_of)
-        file = f"<{kind} {program.__module__}.{program.__name__} {span}>"
+        file = f"<{kind} {program.__module__}.{program_name} {span}>"
         linecache.cache[file] = (len(source), None, source.splitlines(True), file)  # Warp reads the source
         scope = {"wp": wp, "func": func, "SPAN": wp.constant(span), "Indices": Indices}
         for p in parameters:
@@ -220,6 +223,15 @@ def _kernels(program, skip, template, spans, module):
         kernel.__module__ = program.__module__
         kernels[kind] = wp.kernel(kernel, module=module_of(kind, module))
     return func, kernels
+
+
+def _name(program: Callable) -> str:
+    """The name of a program, then those of the device functions that it was made with.
+
+    A function that makes one program for each of several device functions so gives each its own kernel.
+    """
+    captured = inspect.getclosurevars(program).nonlocals.values()
+    return "_".join([program.__name__, *(f.key for f in captured if isinstance(f, wp.Function))])
 
 
 def module_of(kind: str, name: str = FORWARD) -> wp.Module:
@@ -234,6 +246,6 @@ _meeting = wp.kernel(strips_meet, module=module_of("cpu"))
 
 @exclusive
 def strips(count: int, device: wp.Device) -> list[Strip]:
-    """As many strips of a CPU, to capture the same launches with each."""
+    """The strips of a CPU, `count` of them; a graph of the same launches is captured with each."""
     counter = wp.zeros(2, dtype=wp.int32, device=device)
     return [Strip(index, count, counter, _meeting) for index in range(count)]

@@ -20,12 +20,12 @@ Indices = wp.array[wp.int32]
 
 
 class Uniform:
-    """Annotation of a number in device memory: pass an array of one element, receive a `Real`."""
+    """Annotation of a number in device memory: launch with an array of one element, read a `Real`."""
 
 
 class RowReal:
-    """Annotation of a table over the rows: pass a `Field` of them, receive row j's `Real`."""
+    """Annotation of a table over the rows: launch with a `Field`, read the `Real` of row j."""
 
 
 class RowIndex:
-    """Annotation of a table over the rows: pass `Indices`, receive row j's index."""
+    """Annotation of a table over the rows: launch with `Indices`, read the index of row j."""

@@ -1,12 +1,12 @@
 """Strips: the same launches replayed by several CPU threads at once, each on its part of the rows.
 
-A graph is captured once a strip, with that strip current. A launch over many rows then takes this
-strip's share of them; one over few (a coarse level, a sum) is left to the first strip. Before a launch
-that may need what another strip wrote, all of them meet: a counter in shared memory that each raises and
-then watches until all have. Every row is computed by the same code from the same values, so the bits do
+A graph is captured once per strip, with that strip current. A launch over many rows then runs on the strip's
+part of them. A launch over few rows (a coarse level, a sum) is run by the first strip alone. Before a launch
+that may read values of another strip, all strips meet at a barrier: each increments a counter in shared
+memory and waits until all have. Every row is computed by the same code from the same values, so the bits do
 not depend on the number of strips.
 
-All strips of a step must be replayed together, each on a thread of its own, or the ones that are will
+All strips of a step must be replayed at the same time, each by its own thread; otherwise those that run
 wait for ever.
 """
 
@@ -21,15 +21,15 @@ import warp as wp
 from wfluid.kernels.cell.lock import LAUNCHES
 
 SHARED_LINES = 48
-"""Rows from which on a launch is shared: fewer take less time than a meeting."""
+"""Least rows of a launch that strips share: fewer rows take less time than a barrier."""
 
 
 ARRIVALS, GIVEN_UP = 0, 1
-"""Entries of a counter: how often strips have come to a meeting, and whether one will never come."""
+"""Entries of a counter: the number of arrivals at barriers; 1 if a strip has given up, else 0."""
 
 
 @wp.func_native("""
-    // arrivals are counted for ever; a meeting is over when as many have come as make whole rounds
+    // arrivals grow from barrier to barrier; a barrier opens when their number is the next multiple of count
     unsigned int* arrivals = (unsigned int*)counter.data;
     unsigned int mine = __atomic_add_fetch(arrivals, 1u, __ATOMIC_ACQ_REL);
     unsigned int all = (mine + count - 1) / count * count;
@@ -47,7 +47,7 @@ ARRIVALS, GIVEN_UP = 0, 1
     }
 """)
 def wait_for_all(counter: wp.array[wp.int32], count: int):
-    """Wait until `count` strips have come here, or one has given up."""
+    """Wait until `count` strips have arrived, or one has given up."""
     ...
 
 
@@ -57,42 +57,42 @@ def strips_meet(count: int, counter: wp.array[wp.int32]):
 
 @dataclass
 class Strip:
-    """The one of `count` strips whose launches are being captured."""
+    """Strip number `index` of `count`, whose launches are being captured."""
 
     index: int
     count: int
     counter: wp.array
-    """Of meetings; one array for all strips."""
+    """Counter of the barriers; one array for all strips."""
     kernel: wp.Kernel
-    """The meeting."""
+    """Kernel of a barrier."""
     _wrote: str = field(default="nothing", init=False)
-    """Who has written since the last meeting: "nothing", "first" (the first strip) or "all"."""
+    """Strips that have written since the last barrier: "nothing", "first" (the first strip) or "all"."""
     _wrote_before: str | None = field(default=None, init=False)
-    """The same, before the independent launches that are being captured."""
+    """Value of `_wrote` before the independent launches that are being captured; None outside them."""
 
     def share(self, first: int, end: int) -> tuple[int, int]:
-        """This strip's part of lines `first` … `end` - 1, after a meeting where one is needed."""
+        """This strip's part of lines `first` … `end` - 1, after a barrier where one is needed."""
         lines = end - first
         if lines < SHARED_LINES:
             return (first, end) if self.alone() else (end, end)
-        self._see(shared=True)
+        self._note_launch(shared=True)
         return first + lines * self.index // self.count, first + lines * (self.index + 1) // self.count
 
     def alone(self, turn: int = 0) -> bool:
-        """Whether what follows, which one strip does for all, is this one's: strip `turn`, counted round."""
-        by = turn % self.count
-        self._see(shared=by > 0)
-        return self.index == by
+        """Whether this strip is number `turn` (modulo their count), which alone does the work."""
+        runner = turn % self.count
+        self._note_launch(shared=runner > 0)
+        return self.index == runner
 
-    def _see(self, shared: bool) -> None:
-        """Meet if what comes may read what another strip wrote; it writes itself."""
+    def _note_launch(self, shared: bool) -> None:
+        """Put a barrier before a launch that may read values of another strip; note that it writes."""
         read = self._wrote if self._wrote_before is None else self._wrote_before
         if read == "all" or (read == "first" and shared):
             self.meet()
         self._wrote = "all" if shared or self._wrote == "all" else "first"
 
     def meet(self) -> None:
-        """Wait here for the other strips."""
+        """Put a barrier here: wait for the other strips."""
         inputs = [self.count, self.counter]
         wp.launch(self.kernel, dim=1, inputs=inputs, device=self.counter.device, record_tape=False)
         self._wrote = "nothing"
@@ -101,11 +101,11 @@ class Strip:
 
 
 STRIP: ContextVar[Strip | None] = ContextVar("strip", default=None)
-"""The strip whose launches are being captured; None where one thread runs them all."""
+"""The strip whose launches are being captured; None where one thread runs all launches."""
 
 
 def share(first: int, end: int, turn: int | None = None) -> tuple[int, int]:
-    """The part of lines `first` … `end` - 1 that the current strip runs; by `turn` all of them or none."""
+    """The part of lines `first` … `end` - 1 that the current strip runs; all or none with a `turn`."""
     strip = STRIP.get()
     if strip is None:
         return first, end
@@ -116,7 +116,7 @@ def share(first: int, end: int, turn: int | None = None) -> tuple[int, int]:
 
 @contextmanager
 def together() -> Iterator[None]:
-    """Launches within read nothing that another of them writes, so strips need not meet between them."""
+    """No launch within reads what another of them writes, so that no barriers are needed between them."""
     strip = STRIP.get()
     if strip is None or strip._wrote_before is not None:
         yield
@@ -129,7 +129,7 @@ def together() -> Iterator[None]:
 
 
 def alone(work: Callable[[], None]) -> None:
-    """Do what is no launch of a program, such as a copy, once for all strips."""
+    """Do work that is not the launch of a program, such as a copy, on the first strip alone."""
     strip = STRIP.get()
     if strip is None or strip.alone():
         with LAUNCHES:
@@ -137,7 +137,7 @@ def alone(work: Callable[[], None]) -> None:
 
 
 def repeat_while(going: wp.array, body: Callable[[], None]) -> None:
-    """Run `body` as long as going[0], which it changes, is not 0: inside a graph, on every strip."""
+    """Run `body` while going[0] is not 0, which `body` changes: inside a graph, on every strip."""
     strip = STRIP.get()
 
     def meet() -> None:
@@ -145,10 +145,10 @@ def repeat_while(going: wp.array, body: Callable[[], None]) -> None:
             strip.meet()
 
     def everywhere() -> None:
-        meet()  # all have read `going`: now it may be changed
+        meet()  # all strips have read `going`, so that it may change
         body()
-        meet()  # it has been: now all may read it
+        meet()  # `going` has its new value, so that all strips may read it
 
     meet()
     wp.capture_while(going, everywhere)
-    meet()  # all have left
+    meet()  # all strips have left the loop

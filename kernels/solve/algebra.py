@@ -29,7 +29,7 @@ def scale(
     # outputs
     out: Field,
 ):
-    """out = factor f, which may be f itself."""
+    """out = factor f; out may be f."""
     k = inside(k)
     out[k] = factor * f[k]
 
@@ -44,7 +44,7 @@ def multiply(
     # outputs
     out: Field,
 ):
-    """out = g f, which may be f itself."""
+    """out = g f; out may be f."""
     k = inside(k)
     out[k] = g[k] * f[k]
 
@@ -102,6 +102,6 @@ def subtract_number(
     # outputs
     out: Field,
 ):
-    """out = out - number, in place: takes off a mean that should not be there."""
+    """out = out - number, in place: removes a mean."""
     k = inside(k)
     out[k] = out[k] - number

@@ -1,10 +1,9 @@
 """The coarsest level: its operator as a dense symmetric matrix, inverted in device memory.
 
-The matrix is read off the operator by applying it to unit vectors, so it is the operator, walls and
-all. Gauss-Jordan elimination without pivoting is stable for symmetric positive definite matrices. A
-pivot of zero belongs to a face on a wall, which is no unknown: it is passed over, and what comes out is
-zero there (G. Golub, C. Van Loan, Matrix Computations, 4th ed., 4.2 and the sweep operator of Goodnight,
-Amer. Statist. 33, 1979).
+The columns of the matrix are the operator applied to unit vectors, so that walls are included. Gauss-Jordan
+elimination without pivoting is stable for symmetric positive definite matrices. A pivot of zero belongs to a
+face on a wall, which is not an unknown: its step is skipped, and the solution is zero there (G. Golub, C. Van
+Loan, Matrix Computations, 4th ed., 4.2 and the sweep operator of Goodnight, Amer. Statist. 33, 1979).
 """
 
 import warp as wp
@@ -15,7 +14,7 @@ from wfluid.kernels.cell.real import Field, Real
 
 @wp.func
 def place(n: int, nx: int, pitch: int):
-    """Index in a field of unknown n, counted row by row."""
+    """Index in a field of unknown n; unknowns count row by row."""
     row = n // nx
     return index(n - row * nx, row, pitch)
 
@@ -29,11 +28,11 @@ def unit(
     # outputs
     x: Field,
 ):
-    """x = 1 in unknown `which`, 0 elsewhere; `which` may be none of this field's."""
-    one = Real(0.0)
+    """x = 1 in unknown `which`, 0 elsewhere; 0 everywhere if `which` is an unknown of another component."""
+    value = Real(0.0)
     if t == which:
-        one = Real(1.0)
-    x[place(t, nx, pitch)] = one
+        value = Real(1.0)
+    x[place(t, nx, pitch)] = value
 
 
 @lines
@@ -49,7 +48,7 @@ def store_column(
     # outputs
     matrix: Field,
 ):
-    """Entry (first + t, column) of the matrix, from r = -A e; `shift` frees it of its constant."""
+    """matrix[first + t, column] = shift - r[t] with r = -A e; the shift makes a singular A invertible."""
     matrix[(first + t) * unknowns + column] = shift - r[place(t, nx, pitch)]
 
 
@@ -62,7 +61,7 @@ def eliminate(
     # outputs
     out: Field,
 ):
-    """Row t after one elimination step; after a step for every pivot the matrix is its inverse."""
+    """Row t of the matrix after the elimination of a pivot; after all pivots the matrix is its inverse."""
     row = t * unknowns
     top = pivot * unknowns
     d = matrix[top + pivot]
@@ -90,7 +89,7 @@ def collect(
     # outputs
     dense: Field,
 ):
-    """The unknowns of one component, in a row, from entry `first` on."""
+    """dense[first + t] = unknown t of the component f."""
     dense[first + t] = f[place(t, nx, pitch)]
 
 
@@ -106,7 +105,7 @@ def multiply(
     # outputs
     x: Field,
 ):
-    """One component of x = inverse b, b collected; its rows begin at `first`."""
+    """x[t] = sum over c of inverse[first + t, c] dense[c]: one component of x = inverse b."""
     total = Real(0.0)
     row = (first + t) * unknowns
     for c in range(unknowns):

@@ -7,13 +7,12 @@ Both are A x = b with, in cell or face k,
     diffusion   (1 - dt mu Lap) v = v*   ax = dt mu / hx^2, ay = dt mu / hy^2, centre = 1 + 2 ax + 2 ay
     pressure    -div grad q = -div v     ax = 1 / hx^2,     ay = 1 / hy^2,     centre =     2 ax + 2 ay
 
-second order in space; walls are in the ghosts of x. That is `laplacian_c` of `step/differences` with its
-diagonal taken out, `neighbours` - 2 (ax + ay) x: sweeps divide by it, and no term is added to be taken off.
-With face coefficients the pressure operator is -D beta G, beta on x-faces and y-faces, the centre their
-weighted sum.
+second order in space; walls are in the ghosts of x. This is `laplacian_c` of `step/differences` with the
+diagonal apart, `neighbours` - 2 (ax + ay) x, since sweeps divide by the diagonal. With face coefficients the
+pressure operator is -D beta G, beta on x-faces and y-faces; the diagonal is their sum weighted by ax and ay.
 
-A damped Jacobi sweep is x + w (b - A x) / centre. Two sweeps whose damping factors are the inverse
-Chebyshev roots of the spectrum they should remove beat two equal ones at the same cost (Golub & Van
+A damped Jacobi sweep is x + w (b - A x) / centre. Two sweeps with the inverse Chebyshev roots of the
+spectrum to be damped as factors w reduce it more than two equal ones at the same cost (Golub & Van
 Loan, Matrix Computations, 4th ed., 11.2.8; Briggs, Henson & McCormick, A Multigrid Tutorial, ch. 2).
 """
 
@@ -47,7 +46,7 @@ def jacobi(
     # outputs
     out: Field,
 ):
-    """One damped sweep: out = x + rate (b - A x), rate = w / centre."""
+    """out = x + rate (b - A x): one damped sweep, rate = w / centre."""
     k = inside(k)
     out[k] = x[k] + rate * (b[k] - centre * x[k] + neighbours(x, k, pitch, ax, ay))
 
@@ -58,21 +57,21 @@ def first_two_sweeps(
     j: int,
     k: int,
     b: Field,
-    own: Uniform,
-    near: Uniform,
+    centre_factor: Uniform,
+    neighbour_factor: Uniform,
     ax: Uniform,
     ay: Uniform,
     pitch: int,
     # outputs
     out: Field,
 ):
-    """Two damped sweeps from zero in one pass over b. The first leaves w1 b / centre, so both leave
+    """out = centre_factor b + neighbour_factor (ax (b_west + b_east) + ay (b_north + b_south)).
 
-    own b + near (ax (b_west + b_east) + ay (b_north + b_south)),
-    own = (w1 + w2 - w1 w2) / centre, near = w1 w2 / centre^2.
+    That is two damped sweeps from zero in one pass over b: the first gives w1 b / centre, hence
+    centre_factor = (w1 + w2 - w1 w2) / centre and neighbour_factor = w1 w2 / centre^2.
     """
     k = inside(k)
-    out[k] = own * b[k] + near * neighbours(b, k, pitch, ax, ay)
+    out[k] = centre_factor * b[k] + neighbour_factor * neighbours(b, k, pitch, ax, ay)
 
 
 @cells
@@ -89,14 +88,14 @@ def residual(
     # outputs
     r: Field,
 ):
-    """What is left: r = b - A x."""
+    """r = b - A x: the residual at k."""
     k = inside(k)
     r[k] = b[k] - centre * x[k] + neighbours(x, k, pitch, ax, ay)
 
 
 @wp.func
 def diagonal_c(beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
-    """The diagonal of -D beta G."""
+    """ax (beta_x west + beta_x east) + ay (beta_y north + beta_y south): the diagonal of -D beta G."""
     south = inside(k + pitch)
     return ax * (beta_x[k] + beta_x[k + 1]) + ay * (beta_y[k] + beta_y[south])
 
@@ -117,10 +116,10 @@ def jacobi_beta(
     # outputs
     out: Field,
 ):
-    """One damped sweep of -D beta G x = b."""
+    """out = x + damping (b + D beta G x) / centre: one damped sweep at centre k, beta on its faces."""
     k = inside(k)
-    left = b[k] + laplacian_beta_c(x, beta_x, beta_y, k, pitch, ax, ay)
-    out[k] = x[k] + damping * left / diagonal_c(beta_x, beta_y, k, pitch, ax, ay)
+    residual = b[k] + laplacian_beta_c(x, beta_x, beta_y, k, pitch, ax, ay)
+    out[k] = x[k] + damping * residual / diagonal_c(beta_x, beta_y, k, pitch, ax, ay)
 
 
 @cells
@@ -138,7 +137,7 @@ def first_sweep_beta(
     # outputs
     out: Field,
 ):
-    """The sweep from zero: out = damping b / centre."""
+    """out = damping b / centre: the sweep from zero."""
     k = inside(k)
     out[k] = damping * b[k] / diagonal_c(beta_x, beta_y, k, pitch, ax, ay)
 
@@ -158,6 +157,6 @@ def residual_beta(
     # outputs
     r: Field,
 ):
-    """What is left: r = b + D beta G x."""
+    """r = b + D beta G x: the residual at centre k, beta on its faces."""
     k = inside(k)
     r[k] = b[k] + laplacian_beta_c(x, beta_x, beta_y, k, pitch, ax, ay)

@@ -1,12 +1,12 @@
-"""Conjugate gradients preconditioned by a cycle, all its numbers in device memory.
+"""Conjugate gradients preconditioned by a V-cycle M, with all numbers in device memory.
 
     q = -A p,  length = -rz / <p, q>,  x += length p,  r += length q
     z = M r,  rz' = <r, z>,  ratio = rz' / rz,  p = z + ratio p
 
-rz = <r, M r> measures the error in the operator's own norm, <e, A e>, as far as M is A^-1; the loop goes
-on while it is above a limit. J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., algorithm 5.3.
+rz = <r, M r> is the squared error in the norm of A, <e, A e>, to the degree that M approximates A^-1. The
+loop runs while rz is above a limit. J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., algorithm 5.3.
 
-x, r and p are updated in place, each entry from itself.
+x, r and p are updated in place, each entry from its old value.
 """
 
 import warp as wp
@@ -20,7 +20,7 @@ from wfluid.kernels.solve.sums import total_of
 def begin(
     t: int,
     residual_rows: Field,
-    whole_rows: Field,
+    scale_rows: Field,
     count: int,
     tolerance: Real,
     most: int,
@@ -30,10 +30,12 @@ def begin(
     going: Indices,
     iterations: Indices,
 ):
-    """rz of the first residual, and where to stop: at tolerance^2 times the lesser of it and <w, w>."""
+    """rz of the first residual, and its limit: tolerance^2 times the lesser of rz and the sum of
+    `scale_rows`.
+    """
     first = total_of(residual_rows, count)
     rz[0] = first
-    limit[0] = tolerance * tolerance * wp.min(first, total_of(whole_rows, count))
+    limit[0] = tolerance * tolerance * wp.min(first, total_of(scale_rows, count))
     iterations[0] = 0
     going[0] = int(first > limit[0] and most > 0)
 
@@ -47,7 +49,7 @@ def measure_length(
     # outputs
     length: Field,
 ):
-    """length = -rz / <p, q>, 0 where p has come to nothing."""
+    """length = -rz / <p, q>; 0 where p is 0."""
     curvature = -total_of(rows, count)
     length[0] = Real(0.0)
     if curvature > Real(0.0):
@@ -67,12 +69,12 @@ def measure_ratio(
     going: Indices,
     iterations: Indices,
 ):
-    """ratio = rz' / rz; whether to go on. Stops where rounding leaves no descent."""
-    left = total_of(rows, count)
-    ratio[0] = left / rz[0]
-    rz[0] = left
+    """ratio = rz' / rz; going = 1 while rz' is above the limit and fewer than `most` iterations have run."""
+    new = total_of(rows, count)
+    ratio[0] = new / rz[0]
+    rz[0] = new
     iterations[0] = iterations[0] + 1
-    going[0] = int(left > limit[0] and iterations[0] < most)
+    going[0] = int(new > limit[0] and iterations[0] < most)
 
 
 @cells
@@ -94,7 +96,7 @@ def advance(
 
 
 @cells
-def turn(
+def update_direction(
     i: int,
     j: int,
     k: int,

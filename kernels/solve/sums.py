@@ -1,4 +1,4 @@
-"""Sums of fields: one row a line, then one line over the rows."""
+"""Sums of fields: first over each row, one row per line, then over the rows."""
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
@@ -6,7 +6,7 @@ from wfluid.kernels.cell.program import lines
 from wfluid.kernels.cell.real import Field, Real
 
 LANES = wp.constant(8)
-"""Partial sums a row keeps, so that additions need not wait for each other."""
+"""Partial sums of a row, so that an addition need not wait for the one before."""
 
 Lane = wp.types.vector(8, Real)
 
@@ -29,16 +29,16 @@ def row_sums(
     # outputs
     rows: Field,
 ):
-    """The sum of x over row t."""
-    at = index(0, t, pitch)
+    """rows[t] = the sum of x over row t."""
+    row = index(0, t, pitch)
     part = Lane()
-    whole = nx // LANES * LANES
-    for i in range(0, whole, LANES):
+    end = nx // LANES * LANES
+    for i in range(0, end, LANES):
         for lane in range(LANES):
-            part[lane] += x[at + i + lane]
+            part[lane] += x[row + i + lane]
     total = total_of_lanes(part)
-    for i in range(whole, nx):
-        total += x[at + i]
+    for i in range(end, nx):
+        total += x[row + i]
     rows[t] = total
 
 
@@ -53,16 +53,16 @@ def row_products(
     # outputs
     rows: Field,
 ):
-    """Entry first + t: the sum of x y over row t."""
-    at = index(0, t, pitch)
+    """rows[first + t] = the sum of x y over row t."""
+    row = index(0, t, pitch)
     part = Lane()
-    whole = nx // LANES * LANES
-    for i in range(0, whole, LANES):
+    end = nx // LANES * LANES
+    for i in range(0, end, LANES):
         for lane in range(LANES):
-            part[lane] += x[at + i + lane] * y[at + i + lane]
+            part[lane] += x[row + i + lane] * y[row + i + lane]
     total = total_of_lanes(part)
-    for i in range(whole, nx):
-        total += x[at + i] * y[at + i]
+    for i in range(end, nx):
+        total += x[row + i] * y[row + i]
     rows[first + t] = total
 
 
@@ -84,7 +84,7 @@ def mean_of(
     # outputs
     mean: Field,
 ):
-    """The sum of the rows over a number of cells."""
+    """mean = the sum of the rows divided by the number of cells."""
     mean[0] = total_of(rows, count) / Real(cells)
 
 
@@ -98,12 +98,12 @@ def row_norms(
     sum_squares: Field,
     largest: Field,
 ):
-    """Sum of squares and largest absolute value of f in row t."""
+    """sum_squares[t] and largest[t]: sum of squares and largest absolute value of f in row t."""
     total = Real(0.0)
     top = Real(0.0)
-    at = index(0, t, pitch)
+    row = index(0, t, pitch)
     for i in range(nx):
-        value = f[at + i]
+        value = f[row + i]
         total += value * value
         top = wp.max(top, wp.abs(value))
     sum_squares[t] = total

@@ -1,13 +1,12 @@
 """Between a grid and the next coarser one: restriction and prolongation, one axis at a time.
 
-A fine point at coarse position c + t (c whole) is interpolated linearly, (1 - t) e[c] + t e[c + 1],
-where e's ghosts hold the walls. The tables are computed per axis for any two sizes
-(`wfluid.multigrid`), so odd and prime sizes need no special case; their rows and columns count the
-halo. Restriction is the transpose of that, scaled by the ratio of the two sizes: at most four fine
-points a coarse one and axis.
+A fine point at coarse position c + t, c an integer, is interpolated linearly, (1 - t) e[c] + t e[c + 1]; the
+ghosts of e hold the walls. The tables are computed per axis for any two sizes (`wfluid/solve/transfer`), so
+odd and prime sizes need no special case; their rows and columns count the halo. Restriction is the transpose,
+scaled by the ratio of the two sizes: along each axis a coarse point sums at most four fine points.
 
-Each direction runs where it is cheapest: restriction first along y (whole rows with one weight
-each), then along x on the fewer rows left; prolongation in the opposite order.
+Each axis is done where it is cheapest: restriction first along y, with one weight for a row, then along x on
+fewer rows; prolongation in the opposite order.
 """
 
 from wfluid.kernels.cell.native import entry, gather, inside
@@ -33,7 +32,7 @@ def restrict_y(
     # outputs
     out: Field,
 ):
-    """Sum four rows of r, whose pitch is that of out, into coarse row j."""
+    """out = weight_1 r[row_1] + … + weight_4 r[row_4] in coarse row j, fine column i. One pitch."""
     k = inside(k)
     a = inside(k + (row_1 - 2 - j) * pitch)
     b = inside(k + (row_2 - 2 - j) * pitch)
@@ -60,7 +59,7 @@ def restrict_x(
     # outputs
     out: Field,
 ):
-    """Sum four columns of row j of r (pitch `pitch`) into coarse column i."""
+    """out = weight_1 r[column_1] + … + weight_4 r[column_4] in row j, coarse column i. r has `pitch`."""
     k = inside(k)
     i = entry(i)
     start = (j + 2) * pitch
@@ -83,12 +82,12 @@ def prolong_x(
     # outputs
     out: Field,
 ):
-    """Interpolate row j of the coarse field e (pitch `pitch`) to fine column i."""
+    """out = e[column] + fraction (e[column + 1] - e[column]) in row j, fine column i. e has pitch `pitch`."""
     k = inside(k)
     i = entry(i)
-    at = (j + 2) * pitch + column[i]
-    west = gather(e, at)
-    out[k] = west + gather(fraction, i) * (gather(e, at + 1) - west)
+    first = (j + 2) * pitch + column[i]
+    west = gather(e, first)
+    out[k] = west + gather(fraction, i) * (gather(e, first + 1) - west)
 
 
 @cells
@@ -104,7 +103,7 @@ def prolong_y_add(
     # outputs
     out: Field,
 ):
-    """out = x + e interpolated between `row` and the next: the coarse grid's correction. One pitch."""
+    """out = x + e[row] + fraction (e[row + 1] - e[row]) in fine row j. x, e and out have one pitch."""
     k = inside(k)
     a = inside(k + (row - 2 - j) * pitch)
     b = inside(k + (row - 1 - j) * pitch)

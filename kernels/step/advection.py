@@ -1,24 +1,23 @@
-"""Semi-Lagrangian advection: dv/dt = -(v . grad) v, and the same for all that v carries.
+"""Semi-Lagrangian advection: dv/dt = -(v . grad) v.
 
-A value arriving at x left, one step earlier, from its foot x - dt v. The foot is traced once a step,
-at the cell centres, through the divergence-free velocity the step begins with, and kept as an offset
-in cells::
+The value at x was one step earlier at its foot, x - dt v. Feet are traced once per step, from the cell
+centres, through the divergence-free velocity at the start of the step, and kept as offsets in cells::
 
     Euler   foot - x = -dt v(x)
     RK2     foot - x = -dt v(x - dt/2 v(x))       midpoint rule, error dt^3 a step
 
-Velocities on faces use the mean of the two offsets beside them (second order, like the faces
-themselves). Values at a foot are interpolated with Catmull-Rom cubics (third order, no limiter:
-bilinear interpolation would act as a viscosity of up to h^2 / 8 dt) or bilinearly.
+Velocities on faces use the mean of the offsets at the two centres beside them (second order). Values at a
+foot are interpolated with Catmull-Rom cubics (third order, no limiter: bilinear interpolation would act as a
+viscosity of up to h^2 / 8 dt) or bilinearly.
 
-Stable for any dt: a foot beyond a wall is put on the wall, a periodic axis wraps. J. Stam, Stable
+Stable for any dt: a foot beyond a wall is moved to the wall, a periodic axis wraps. J. Stam, Stable
 Fluids, 1999, section 3.2; R. Bridson, Fluid Simulation for Computer Graphics, 2nd ed., chapter 3.
 """
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import inside
-from wfluid.kernels.cell.program import cells
+from wfluid.kernels.cell.program import Program, cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
 from wfluid.kernels.step.differences import mean_f
 from wfluid.kernels.step.interpolation import bilinear, cubic, kept_inside, locate
@@ -26,7 +25,7 @@ from wfluid.kernels.step.interpolation import bilinear, cubic, kept_inside, loca
 
 @wp.func
 def velocity_c(u: Field, v: Field, k: int, pitch: int):
-    """Velocity at centre k, from the faces around it."""
+    """Velocity at centre k: along each axis the mean of its two faces."""
     south = inside(k + pitch)
     return Real(0.5) * (u[k] + u[k + 1]), Real(0.5) * (v[k] + v[south])
 
@@ -49,7 +48,7 @@ def trace_euler(
     foot_x: Field,
     foot_y: Field,
 ):
-    """Offset [cells] from centre k to its foot, Euler: -dt v(x)."""
+    """foot - x = -dt v(x) [cells] at centre k, by Euler's rule; u, v [longer side/s], dt_h = dt / h."""
     k = inside(k)
     u_centre, v_centre = velocity_c(u, v, k, pitch)
     foot_x[k] = kept_inside(-dt_hx * u_centre, i, nx, periodic_x)
@@ -74,7 +73,7 @@ def trace_midpoint(
     foot_x: Field,
     foot_y: Field,
 ):
-    """Offset [cells] from centre k to its foot, midpoint rule: -dt v(x - dt/2 v(x))."""
+    """foot - x = -dt v(x - dt/2 v(x)) [cells] at centre k, by the midpoint rule; dt_h = dt / h."""
     k = inside(k)
     half = Real(0.5)
     u_centre, v_centre = velocity_c(u, v, k, pitch)
@@ -90,49 +89,36 @@ def trace_midpoint(
     foot_y[k] = kept_inside(-dt_hy * v_middle, j, ny, periodic_y)
 
 
-@cells
-def advect_face_cubic(
-    i: int,
-    j: int,
-    k: int,
-    f: Field,
-    foot_x: Field,
-    foot_y: Field,
-    before: int,
-    nx: int,
-    ny: int,
-    periodic_x: int,
-    periodic_y: int,
-    pitch: int,
-    # outputs
-    out: Field,
-):
-    """A face component at its foot, cubic; `before` = 1 on x-faces, `pitch` on y-faces."""
-    k = inside(k)
-    column, tx = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
-    row, ty = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
-    out[k] = cubic(f, index(column, row, pitch), pitch, tx, ty)
+def _advect_face(interpolate: wp.Function) -> Program:
+    @cells
+    def advect_face(
+        i: int,
+        j: int,
+        k: int,
+        f: Field,
+        foot_x: Field,
+        foot_y: Field,
+        before: int,
+        nx: int,
+        ny: int,
+        periodic_x: int,
+        periodic_y: int,
+        pitch: int,
+        # outputs
+        out: Field,
+    ):
+        """out = the velocity component f at the foot of face k [longer side/s].
+
+        The foot of a face is the mean of foot_x and foot_y [cells] at the centres k - `before` and k, with
+        `before` = 1 on x-faces and `pitch` on y-faces.
+        """
+        k = inside(k)
+        column, tx = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
+        row, ty = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
+        out[k] = interpolate(f, index(column, row, pitch), pitch, tx, ty)
+
+    return advect_face
 
 
-@cells
-def advect_face_bilinear(
-    i: int,
-    j: int,
-    k: int,
-    f: Field,
-    foot_x: Field,
-    foot_y: Field,
-    before: int,
-    nx: int,
-    ny: int,
-    periodic_x: int,
-    periodic_y: int,
-    pitch: int,
-    # outputs
-    out: Field,
-):
-    """A face component at its foot, bilinear; `before` = 1 on x-faces, `pitch` on y-faces."""
-    k = inside(k)
-    column, tx = locate(i, mean_f(foot_x, k, before), nx, periodic_x)
-    row, ty = locate(j, mean_f(foot_y, k, before), ny, periodic_y)
-    out[k] = bilinear(f, index(column, row, pitch), pitch, tx, ty)
+advect_face_cubic = _advect_face(cubic)
+advect_face_bilinear = _advect_face(bilinear)

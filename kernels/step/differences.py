@@ -1,10 +1,10 @@
-"""Differences and means of neighbours on the staggered grid: gradient G, divergence D, L = D G, each once.
+"""Differences and means of neighbours on the staggered grid: gradient G, divergence D, Laplacian L = D G.
 
 A suffix says where the value lives: `_x` on the x-face k, between centres k - 1 and k; `_y` on the y-face k,
 between k - pitch and k; `_f` on either of them, by its stride `before` = 1 or pitch; `_c` at the centre k;
-`_n` at the node where cell k begins. Of values on faces `gradient_x` and `gradient_y` lie half a
-cell on: at the centre before k along the difference, or at the node where cell k begins across it. Second
-order. Walls are in the ghosts, so that G = -D^T.
+`_n` at the top left node of cell k. Applied to values on faces, `gradient_x` and `gradient_y` give a value
+at centre k - 1 or k - pitch if the faces are across the difference, else at the top left node of cell k.
+Second order. Walls are in the ghosts, so that G = -D^T.
 
 Coefficients beta live on faces: L becomes D beta G.
 """
@@ -16,7 +16,7 @@ from wfluid.kernels.cell.real import Field, Real
 
 @wp.func
 def mean_f(c: Field, k: int, before: int):
-    """Mean of a value at centres, on face k; of one on faces, at the centre."""
+    """(c[k - before] + c[k]) / 2: on face k if c is at centres, at centre k - before if c is on faces."""
     return Real(0.5) * (c[inside(k - before)] + c[k])
 
 
@@ -57,7 +57,7 @@ def laplacian_c(q: Field, k: int, pitch: int, ax: Real, ay: Real):
 
 @wp.func
 def laplacian_beta_c(q: Field, beta_x: Field, beta_y: Field, k: int, pitch: int, ax: Real, ay: Real):
-    """D beta G q at centre k: the same with a coefficient on every face."""
+    """D beta G q at centre k, beta on the faces; a = 1 / h^2 is taken out of both differences."""
     south = inside(k + pitch)
     along_x = gradient_x(q, k + 1, beta_x[k + 1]) - gradient_x(q, k, beta_x[k])
     along_y = gradient_y(q, south, pitch, beta_y[south]) - gradient_y(q, k, pitch, beta_y[k])

@@ -7,13 +7,13 @@ Most forces are Gaussians of centre c and radius sigma, with r = (x - c) / sigma
     push    p g                   a vector p
     vortex  w (-r_y, r_x) g       without divergence
 
-so two profiles per axis, at faces and at centres, replace one exponential a cell. Over a step the
-velocity gains the force's impulse (integrated over the step by the host, hence exact for every envelope
-and any dt). Beyond `CUT` radii g is below rounding and taken as zero: a force runs on the box of that
-size only.
+so two profiles per axis, at faces and at centres, replace one exponential per cell. In a step the velocity
+increases by the impulse of the force, which the host integrates over the step, exactly for every envelope and
+any dt. Beyond `CUT` radii g is below rounding and set to 0, so a force is computed only in the box of that
+size.
 
-Other forces are fields on the faces, made once, times their impulse; or a density, at centres, times a
-vector. A weight is a factor at centres, of which a face takes the mean of its two.
+Other forces are an impulse times a constant field on the faces, or times a density at centres. A weight is a
+factor at centres; a face takes the mean of its two.
 """
 
 import warp as wp
@@ -24,7 +24,7 @@ from wfluid.kernels.cell.real import Field, Real, RowReal, Uniform
 from wfluid.kernels.step.differences import mean_f
 
 CUT = wp.constant(Real({"float32": 6.0, "float64": 9.0}[Real.__name__]))
-"""Radii after which exp(-r^2/2) is below the rounding of one."""
+"""Distance [radii] beyond which exp(-r^2/2) is below the rounding of 1."""
 
 
 @cells
@@ -41,9 +41,10 @@ def profile(
     r: Field,
     g: Field,
 ):
-    """Distance [radii] and Gaussian of force j at the point (i + start) h of one axis.
+    """r and g = exp(-r^2 / 2) of force j at position (i + start) h along one axis; r in radii.
 
-    `period` is the length of a periodic axis, whose nearest image counts, and 0 between walls.
+    centre, radius and h are in longer sides. `period` is the length of a periodic axis, where r is the
+    distance to the nearest image; 0 between walls.
     """
     k = inside(k)
     d = (Real(i) + start) * h - centre
@@ -59,7 +60,7 @@ def profile(
 
 @wp.func
 def in_profile(n: int, i: int, pitch: int):
-    """Index of point i of force n in a table of profiles."""
+    """Index of point i in the profile of force n."""
     return entry(index(i, n, pitch))
 
 
@@ -71,7 +72,7 @@ def push(
     k: int,
     push_x: Field,
     push_y: Field,
-    turn: Field,
+    spin: Field,
     face_x: Field,
     centre_x: Field,
     centre_y: Field,
@@ -84,12 +85,16 @@ def push(
     u: Field,
     v: Field,
 ):
-    """Add what force n gains [L/s] on the x-face and the y-face of cell k, in place."""
+    """u += (push_x - spin r_y) g on x-face k, v += (push_y + spin r_x) g on y-face k, in place.
+
+    push_x, push_y and spin are the impulses of force n [longer side/s], g and r its profiles at faces and
+    centres.
+    """
     k = inside(k)
     column = in_profile(n, i, pitch_x)
     row = in_profile(n, j, pitch_y)
-    on_u = (gather(push_x, n) - gather(turn, n) * gather(r_y, row)) * gather(centre_y, row)
-    on_v = gather(push_y, n) + gather(turn, n) * gather(r_x, column)
+    on_u = (gather(push_x, n) - gather(spin, n) * gather(r_y, row)) * gather(centre_y, row)
+    on_v = gather(push_y, n) + gather(spin, n) * gather(r_x, column)
     u[k] = u[k] + on_u * gather(face_x, column)
     v[k] = v[k] + on_v * gather(centre_x, column) * gather(face_y, row)
 
@@ -105,7 +110,7 @@ def lift(
     # outputs
     u: Field,
 ):
-    """Add a density's buoyancy to one component, in place: impulse times its mean at k and k - `before`."""
+    """u += impulse (rho[k - before] + rho[k]) / 2 on face k: buoyancy of a density at centres, in place."""
     k = inside(k)
     u[k] = u[k] + impulse * mean_f(rho, k, before)
 
@@ -120,7 +125,7 @@ def push_field(
     # outputs
     u: Field,
 ):
-    """Add the field f on faces, times the impulse of its envelope [s], to one component, in place."""
+    """u += impulse f on face k, in place: f [longer side/s^2] a force, impulse [s] from its envelope."""
     k = inside(k)
     u[k] = u[k] + impulse * f[k]
 
@@ -136,6 +141,9 @@ def push_weighted(
     # outputs
     u: Field,
 ):
-    """Add what forces gained [L/s], times a weight at centres k and k - `before`, in place."""
+    """u += (weight[k - before] + weight[k]) / 2 gained on face k, in place.
+
+    `gained` is the change of velocity by forces [longer side/s], `weight` a factor at centres.
+    """
     k = inside(k)
     u[k] = u[k] + mean_f(weight, k, before) * gained[k]

@@ -4,11 +4,11 @@ Along each axis every padded position has a source position inside the grid and 
 
     f[ghost] = sign * f[source]
 
-so that even reflection (zero slope), odd reflection (zero value at the wall), faces on a wall (zero)
-and periodic copies are four fillings of one table (`wfluid.walls`). A ghost in a corner takes the
-product of both axes' signs, so rows and columns may be filled in any order.
+so that one kernel serves even reflection (zero slope), odd reflection (zero value at the wall), faces on a
+wall (zero) and periodic copies (`wfluid/domain/walls`). The sign of a ghost in a corner is the product of the
+signs of both axes, so rows and columns may be filled in any order.
 
-Written in place: only ghosts and faces on a wall are written, only other cells are read.
+The field is changed in place: only ghosts and faces on a wall are written, only other entries are read.
 """
 
 from wfluid.kernels.cell.program import lines
@@ -28,10 +28,10 @@ def fill(
     # outputs
     f: Field,
 ):
-    """Fill row t's ghosts for t < ny, then column t - ny's (counted with the halo).
+    """f[ghost] = sign f[source] in row t for t < ny, then in column t - ny, counted with the halo.
 
     `column_source`, `column_sign` have nx + 4 entries for columns -2 … nx + 1, `row_*` likewise.
-    The first inner column and row are written too: there a face may lie on the wall.
+    The first column and row of cells are written too, since their faces may be on a wall.
     """
     if t < ny:
         j = t + 2

@@ -1,12 +1,13 @@
-"""Interpolation between cells: where a point lies, Catmull-Rom and bilinear weights.
+"""Interpolation between cells: the cell and the fraction of a position, Catmull-Rom and bilinear weights.
 
-A cubic through four points in a row, t past the second, in the order in which they lie:
+The weights of a cubic through four points in a row, t past the second:
 
     w_0(t) = t (-1/2 + t (1 - t/2))      w_2(t) = w_1(1 - t)
     w_1(t) = 1 + t^2 (-5/2 + 3/2 t)      w_3(t) = w_0(1 - t)
 
-(E. Catmull, R. Rom, 1974). Two programs have them in C as well, where a whole span or four channels are done
-at once (`adjoint/scatter`, `view/lookup`), and the host has them in `domain/piecewise`; tests hold all equal.
+(E. Catmull, R. Rom, 1974). Two programs have these weights in C as well, for all cells of a span or for
+four channels at once (`adjoint/scatter`, `view/lookup`), and the host has them in `domain/piecewise`; tests
+assert that all are equal.
 """
 
 import warp as wp
@@ -16,18 +17,18 @@ from wfluid.kernels.cell.real import Field, Real
 
 @wp.func
 def locate(i: int, offset: Real, n: int, periodic: int):
-    """Split position i + offset on an axis of n cells: index of the point before it, fraction past it.
+    """Split position i + offset on an axis of n points: index of the point before it, fraction past it.
 
-    Points lie at 0 … n - 1, with the ghost -1 before and n after; a wall stops the position at the
-    last interval, a periodic axis wraps the index.
+    Points have positions 0 … n - 1, ghosts -1 and n. Beyond a ghost the position is that of the ghost; on a
+    periodic axis the index wraps.
     """
-    whole = wp.floor(offset)
-    fraction = offset - whole
-    before = i + int(whole)
+    cells = wp.floor(offset)
+    fraction = offset - cells
+    before = i + int(cells)
     stopped = wp.min(wp.max(before, -1), n - 1)
     stopped_fraction = wp.min(wp.max(fraction + Real(before - stopped), Real(0.0)), Real(1.0))
-    turned = i + int(whole - Real(n) * wp.floor(whole / Real(n)))
-    wrapped = wp.min(wp.max(wp.where(turned < n, turned, turned - n), 0), n - 1)
+    ahead = i + int(cells - Real(n) * wp.floor(cells / Real(n)))
+    wrapped = wp.min(wp.max(wp.where(ahead < n, ahead, ahead - n), 0), n - 1)
     on_wall = periodic == 0
     return wp.where(on_wall, stopped, wrapped), wp.where(on_wall, stopped_fraction, fraction)
 
@@ -45,7 +46,7 @@ def inner_weight(t: Real):
 
 
 Four = wp.types.vector(4, Real)
-"""A number for each of four points in a row."""
+"""A vector of one number for each of four points in a row."""
 
 
 @wp.func
@@ -81,7 +82,7 @@ def weighted_row(f: Field, k: int, a: Real, b: Real, c: Real, d: Real):
 
 @wp.func
 def cubic(f: Field, k: int, pitch: int, tx: Real, ty: Real):
-    """Catmull-Rom interpolation of f, tx and ty past point k."""
+    """Catmull-Rom interpolation of f at tx, ty [cells] past point k."""
     sx = Real(1.0) - tx
     sy = Real(1.0) - ty
     a = outer_weight(tx)
@@ -98,7 +99,7 @@ def cubic(f: Field, k: int, pitch: int, tx: Real, ty: Real):
 
 @wp.func
 def bilinear(f: Field, k: int, pitch: int, tx: Real, ty: Real):
-    """Bilinear interpolation of f, tx and ty past point k."""
+    """Bilinear interpolation of f at tx, ty [cells] past point k."""
     north = gather(f, k) + tx * (gather(f, k + 1) - gather(f, k))
     south = gather(f, k + pitch) + tx * (gather(f, k + pitch + 1) - gather(f, k + pitch))
     return north + ty * (south - north)
@@ -106,7 +107,7 @@ def bilinear(f: Field, k: int, pitch: int, tx: Real, ty: Real):
 
 @wp.func
 def kept_inside(offset: Real, i: int, n: int, periodic: int):
-    """Offset from centre i that ends on the wall where it would end beyond it."""
+    """The offset [cells] from centre i, limited so that it ends no further than the wall of a closed axis."""
     middle = Real(i) + Real(0.5)
     stopped = wp.min(wp.max(offset, -middle), Real(n) - middle)
     return wp.where(periodic == 1, offset, stopped)

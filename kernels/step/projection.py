@@ -1,13 +1,12 @@
-"""Pressure projection: the part of v that is divergence-free, v - grad q with Lap q = div v.
+"""Pressure projection: the divergence-free part of v, which is v - grad q with Lap q = div v.
 
-On the staggered grid the divergence D lives at centres, the gradient G = -D^T on faces, and the
-Laplacian solved (`solve/five_point`) is exactly D G: what the solver leaves of D G q = D v is what is left
-of the divergence. With face coefficients beta the velocity becomes v - beta grad q and the operator
-D beta G. A pressure known from the step before may be taken off first (`subtract_slope`): what is left to
-project is then small, and so is the strain that projecting puts back where viscosity had taken it out
-(incremental pressure correction; Guermond, Minev & Shen, Comput. Methods Appl. Mech. Eng. 195, 2006,
-section 3.2). Faces on a wall keep zero through their ghosts. Bonilla & Velho, section II, step 4;
-Bridson, 2nd ed., chapter 5.
+On the staggered grid the divergence D is at centres, the gradient G = -D^T on faces, and the Laplacian of the
+solve (`solve/five_point`) is exactly D G: the residual of D G q = D v is the divergence after projection.
+With face coefficients beta the velocity becomes v - beta grad q and the operator D beta G. The pressure of
+the step before may be subtracted first (`subtract_slope`). The projection then changes v little, and so adds
+little of the strain that viscosity has removed (incremental pressure correction; Guermond, Minev & Shen,
+Comput. Methods Appl. Mech. Eng. 195, 2006, section 3.2). Faces on a wall stay zero. Bonilla & Velho, section
+II, step 4; Bridson, 2nd ed., chapter 5.
 """
 
 from wfluid.kernels.cell.native import inside
@@ -46,7 +45,7 @@ def subtract_slope(
     # outputs
     out: Field,
 ):
-    """f - kept dq/ds on the face between centres k - `before` and k: one component of v - kept G q.
+    """out = f - kept dq/ds on face k, between centres k - `before` and k: one component of v - kept G q.
 
     kept_h = kept / h; `before` = 1 on x-faces, `pitch` on y-faces.
     """
@@ -69,7 +68,7 @@ def subtract_gradient(
     out_u: Field,
     out_v: Field,
 ):
-    """v - G q on the x-face and the y-face of cell k."""
+    """out_u, out_v = v - G q [longer side/s] on the x-face and the y-face of cell k; q is at centres."""
     k = inside(k)
     out_u[k] = u[k] - gradient_x(q, k, inverse_hx)
     out_v[k] = v[k] - gradient_y(q, k, pitch, inverse_hy)
@@ -92,7 +91,7 @@ def subtract_gradient_beta(
     out_u: Field,
     out_v: Field,
 ):
-    """v - beta G q on the x-face and the y-face of cell k."""
+    """out_u, out_v = v - beta G q [longer side/s] on the x-face and the y-face of cell k; q is at centres."""
     k = inside(k)
     out_u[k] = u[k] - gradient_x(q, k, beta_x[k] * inverse_hx)
     out_v[k] = v[k] - gradient_y(q, k, pitch, beta_y[k] * inverse_hy)

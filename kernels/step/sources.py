@@ -1,11 +1,11 @@
-"""Sources: a density poured in, and divergence prescribed to the flow.
+"""Sources of densities, and sources of volume, which prescribe the divergence.
 
-A density gains Gaussians, d rho/dt = S (Bonilla & Velho, section II). A divergence s = div v makes the
-picture grow or shrink; with r = (x - c) / sigma
+The source S of a density is a sum of Gaussians, d rho/dt = S (Bonilla & Velho, section II). A prescribed
+divergence s = div v makes the picture grow or shrink; with r = (x - c) / sigma
 
     s(x) = a (1 - |r|^2 / 2) exp(-|r|^2 / 2)
 
-has no integral over the plane, since it is the divergence of a (x - c) exp(-|r|^2 / 2) / 2. Both are
+has integral 0 over the plane, since it is the divergence of a (x - c) exp(-|r|^2 / 2) / 2. Both are
 sums of products of profiles along x and y (`forces`).
 """
 
@@ -29,7 +29,7 @@ def pour(
     # outputs
     rho: Field,
 ):
-    """Add the Gaussian n, times its amount, to the density at centre k, in place."""
+    """rho += amount g of Gaussian n at centre k, in place."""
     k = inside(k)
     g = gather(centre_x, in_profile(n, i, pitch_x)) * gather(centre_y, in_profile(n, j, pitch_y))
     rho[k] = rho[k] + gather(amount, n) * g
@@ -51,7 +51,7 @@ def swell(
     # outputs
     s: Field,
 ):
-    """Add the divergence [1/s] of source n at centre k, in place."""
+    """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place."""
     k = inside(k)
     column = in_profile(n, i, pitch_x)
     row = in_profile(n, j, pitch_y)
@@ -71,7 +71,7 @@ def add_balanced(
     # outputs
     b: Field,
 ):
-    """Add the divergence s less its mean, for which closed walls have no place, to b = -div v, in place."""
+    """b += s - mean [1/s] at centre k, in place, with b = -div v; closed walls admit no mean divergence."""
     k = inside(k)
     b[k] = b[k] + (s[k] - mean)
 
@@ -86,6 +86,6 @@ def pour_field(
     # outputs
     rho: Field,
 ):
-    """Add a field at centres, times the integral of its envelope [s], to the density, in place."""
+    """rho += impulse f at centre k, in place: f a source [1/s], impulse the integral of its envelope [s]."""
     k = inside(k)
     rho[k] = rho[k] + impulse * f[k]

@@ -1,78 +1,58 @@
-"""Transport of the picture's coordinates: ds/dt = -(v . grad) s, s(x) the place in the source picture
-that is seen at x now (Bonilla & Velho, section II: the parametrisation is carried, not the pixels).
+"""Transport of the picture's coordinates: ds/dt = -(v . grad) s, s(x) the position in the source picture
+that is shown at x (Bonilla & Velho, section II: the parametrisation is advected, not the pixels).
 
-What is carried is the displacement d = s - x: it is smooth, zero at rest, and continuous across a
-periodic seam. Over one step
+The displacement d = s - x is advected: it is smooth, zero at rest, and continuous across a periodic seam.
+Over one step
 
     s_new(x) = s(foot)   so   d_new(x) = d(foot) + (foot - x)
 
 The displacement is kept in cells, d_x in units of hx and d_y in units of hy.
 
-A density rho is carried by its values, d rho/dt = -(v . grad) rho, between the least and the greatest of
-the four around its foot: a cubic alone would ring at its edges and go below nothing. Points of the
-picture are carried forward, dx/dt = v(x), by the midpoint rule.
+A density rho is advected, d rho/dt = -(v . grad) rho, and limited to the range of the four values around the
+foot: a cubic alone would overshoot at edges and become negative. Points of the picture move forward,
+dx/dt = v(x), by the midpoint rule.
 """
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import gather, inside
-from wfluid.kernels.cell.program import cells, lines
+from wfluid.kernels.cell.program import Program, cells, lines
 from wfluid.kernels.cell.real import Field, Real, Uniform
 from wfluid.kernels.step.interpolation import bilinear, cubic, locate
 
 
-@cells
-def carry_map_cubic(
-    i: int,
-    j: int,
-    k: int,
-    d_x: Field,
-    d_y: Field,
-    foot_x: Field,
-    foot_y: Field,
-    nx: int,
-    ny: int,
-    periodic_x: int,
-    periodic_y: int,
-    pitch: int,
-    # outputs
-    out_x: Field,
-    out_y: Field,
-):
-    """Displacement [cells] at centre k after the step, cubic."""
-    k = inside(k)
-    column, tx = locate(i, foot_x[k], nx, periodic_x)
-    row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = index(column, row, pitch)
-    out_x[k] = cubic(d_x, at, pitch, tx, ty) + foot_x[k]
-    out_y[k] = cubic(d_y, at, pitch, tx, ty) + foot_y[k]
+def _carry_map(interpolate: wp.Function) -> Program:
+    @cells
+    def carry_map(
+        i: int,
+        j: int,
+        k: int,
+        d_x: Field,
+        d_y: Field,
+        foot_x: Field,
+        foot_y: Field,
+        nx: int,
+        ny: int,
+        periodic_x: int,
+        periodic_y: int,
+        pitch: int,
+        # outputs
+        out_x: Field,
+        out_y: Field,
+    ):
+        """out = d(foot) + (foot - x): the displacement [cells] at centre k after the step."""
+        k = inside(k)
+        column, tx = locate(i, foot_x[k], nx, periodic_x)
+        row, ty = locate(j, foot_y[k], ny, periodic_y)
+        corner = index(column, row, pitch)
+        out_x[k] = interpolate(d_x, corner, pitch, tx, ty) + foot_x[k]
+        out_y[k] = interpolate(d_y, corner, pitch, tx, ty) + foot_y[k]
+
+    return carry_map
 
 
-@cells
-def carry_map_bilinear(
-    i: int,
-    j: int,
-    k: int,
-    d_x: Field,
-    d_y: Field,
-    foot_x: Field,
-    foot_y: Field,
-    nx: int,
-    ny: int,
-    periodic_x: int,
-    periodic_y: int,
-    pitch: int,
-    # outputs
-    out_x: Field,
-    out_y: Field,
-):
-    """Displacement [cells] at centre k after the step, bilinear."""
-    k = inside(k)
-    column, tx = locate(i, foot_x[k], nx, periodic_x)
-    row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = index(column, row, pitch)
-    out_x[k] = bilinear(d_x, at, pitch, tx, ty) + foot_x[k]
-    out_y[k] = bilinear(d_y, at, pitch, tx, ty) + foot_y[k]
+carry_map_cubic = _carry_map(cubic)
+carry_map_bilinear = _carry_map(bilinear)
 
 
 @cells
@@ -91,7 +71,7 @@ def carried_along(
     # outputs
     out: Field,
 ):
-    """What of a field on the source picture is at centre k now: f(x + d), bilinear, so within its range."""
+    """out = f(x + d) at centre k: a field over the source picture, by bilinear interpolation; d in cells."""
     k = inside(k)
     column, tx = locate(i, d_x[k], nx, periodic_x)
     row, ty = locate(j, d_y[k], ny, periodic_y)
@@ -114,25 +94,28 @@ def carry_density(
     # outputs
     out: Field,
 ):
-    """A density at the foot of centre k: cubic, limited to the range of the four around it."""
+    """out = rho(foot) at centre k: cubic, limited to the range of the four values around the foot."""
     k = inside(k)
     column, tx = locate(i, foot_x[k], nx, periodic_x)
     row, ty = locate(j, foot_y[k], ny, periodic_y)
-    at = index(column, row, pitch)
-    a = gather(rho, at)
-    b = gather(rho, at + 1)
-    c = gather(rho, at + pitch)
-    d = gather(rho, at + pitch + 1)
+    corner = index(column, row, pitch)
+    a = gather(rho, corner)
+    b = gather(rho, corner + 1)
+    c = gather(rho, corner + pitch)
+    d = gather(rho, corner + pitch + 1)
     least = wp.min(wp.min(a, b), wp.min(c, d))
     most = wp.max(wp.max(a, b), wp.max(c, d))
-    out[k] = wp.min(wp.max(cubic(rho, at, pitch, tx, ty), least), most)
+    out[k] = wp.min(wp.max(cubic(rho, corner, pitch, tx, ty), least), most)
 
 
 @wp.func
 def velocity_at(
     u: Field, v: Field, x: Real, y: Real, nx: int, ny: int, periodic_x: int, periodic_y: int, pitch: int
 ):
-    """Velocity at (x, y) [cells from the corner], cubic: faces lie at whole x (or y), half y (or x)."""
+    """Velocity [longer side/s] at (x, y) [cells from the picture's corner], by cubic interpolation.
+
+    u is at integer x and half-integer y, v at half-integer x and integer y.
+    """
     half = Real(0.5)
     face_column, face_tx = locate(0, x, nx, periodic_x)
     row, ty = locate(0, y - half, ny, periodic_y)
@@ -145,7 +128,7 @@ def velocity_at(
 
 @wp.func
 def within(x: Real, n: int, periodic: int):
-    """The nearest place to x between the walls; where the axis wraps x itself, however far it went."""
+    """x [cells], limited to 0 … n between walls; x unchanged on a periodic axis."""
     return wp.where(periodic == 1, x, wp.min(wp.max(x, Real(0.0)), Real(n)))
 
 
@@ -167,7 +150,9 @@ def carry_points(
     out_x: Field,
     out_y: Field,
 ):
-    """Point t [cells from the corner] after the step, midpoint rule."""
+    """Position of point t [cells from the picture's corner] after the step: x + dt v(x + dt/2 v(x)); dt_h =
+    dt / h.
+    """
     half = Real(0.5)
     u0, v0 = velocity_at(u, v, x[t], y[t], nx, ny, periodic_x, periodic_y, pitch)
     x1 = x[t] + half * dt_hx * u0

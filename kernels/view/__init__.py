@@ -1,4 +1,4 @@
-"""The picture seen through a map, and what a map is judged by."""
+"""The look-up of a picture through a map, and figures of the map."""
 
 from wfluid.kernels.view import lookup, quality
 

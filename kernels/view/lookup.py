@@ -1,15 +1,15 @@
-"""The picture seen through a map: new(x, y) = old(source of (x, y)).
+"""The look-up of a picture through a map: new(x, y) = old(source of (x, y)).
 
-First the displacement is interpolated from the fluid's cells up to the pixels, Catmull-Rom, along y
-and then along x with one set of weights per row and per column; then every pixel reads its source.
-Pixel coordinates count from the centre of the first pixel. A picture is an array of 4-vectors, one a
-pixel, row by row without padding: four channels are read, weighted and added at once.
+First the displacement is interpolated from the fluid's cells to the pixels with Catmull-Rom cubics, along y
+and then along x, with one set of weights per row and per column. Then every pixel reads its source. Pixel
+coordinates count from the centre of the first pixel. A picture is an array of 4-vectors, one per pixel, row
+by row without padding: its four channels are read, weighted and added at once.
 """
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
-from wfluid.kernels.cell.program import cells
+from wfluid.kernels.cell.program import Program, cells
 from wfluid.kernels.cell.real import Field, Indices, Real, RowIndex, RowReal
 from wfluid.kernels.step.interpolation import Four, cubic_weights
 
@@ -36,7 +36,10 @@ def stretch_y(
     # outputs
     out: Field,
 ):
-    """Displacement in pixel row j for every grid column, from four rows, the second one `row`."""
+    """out = weight_1 d[row - 1] + … + weight_4 d[row + 2]: the displacement in pixel row j at grid column i.
+
+    d and out are displacements at centres [cells]; `row` is the grid row before pixel row j.
+    """
     k = inside(k)
     a = inside(k + (row - 3 - j) * pitch)
     b = inside(k + (row - 2 - j) * pitch)
@@ -64,12 +67,15 @@ def stretch_x(
     # outputs
     out: Field,
 ):
-    """Source coordinate [px] of pixel (i, j): origin + step_x i + step_y j + slope d."""
+    """out = origin + step_x i + step_y j + slope d: the source coordinate [px] of pixel (i, j).
+
+    d [cells] is interpolated along row j from four grid columns, `column`[i] the first of them.
+    """
     k = inside(k)
     i = entry(i)
-    at = index(column[i], j, pitch)
-    west = gather(weight_1, i) * gather(d, at) + gather(weight_2, i) * gather(d, at + 1)
-    east = gather(weight_3, i) * gather(d, at + 2) + gather(weight_4, i) * gather(d, at + 3)
+    first = index(column[i], j, pitch)
+    west = gather(weight_1, i) * gather(d, first) + gather(weight_2, i) * gather(d, first + 1)
+    east = gather(weight_3, i) * gather(d, first + 2) + gather(weight_4, i) * gather(d, first + 3)
     out[k] = origin + step_x * Real(i) + step_y * Real(j) + slope * (west + east)
 
 
@@ -82,7 +88,7 @@ def modulo(i: int, n: int):
 
 @wp.func
 def at_edge(i: int, n: int, edge: int):
-    """The pixel that stands for pixel i of n beyond the picture's edge, or -1 for none."""
+    """The pixel 0 … n - 1 that position i reads under the edge rule, or -1 for none."""
     inner = i
     if i < 0 or i >= n:
         if edge == CLAMP:
@@ -109,76 +115,53 @@ def pixel(picture: Pixels, x: int, y: int, width: int, height: int, edge_x: int,
 
 
 FAR = wp.constant(Real(1.0e8))
-"""Source coordinates are stopped here [px], so that they fit an integer."""
+"""Limit of source coordinates [px], so that they fit an integer."""
 
 
 @wp.func
 def whole_and_fraction(coordinate: Real):
-    """A source coordinate [px] as the pixel before it and the part of a pixel past that."""
+    """Split a source coordinate [px]: the index of the pixel before it, the fraction past that pixel."""
     stopped = wp.min(wp.max(coordinate, -FAR), FAR)
     before = wp.floor(stopped)
     return int(before), stopped - before
 
 
-@cells
-def look_up_nearest(
-    i: int,
-    j: int,
-    k: int,
-    picture: Pixels,
-    source_x: Field,
-    source_y: Field,
-    width: int,
-    height: int,
-    edge_x: int,
-    edge_y: int,
-    # outputs
-    out: Pixels,
+@wp.func
+def nearest(
+    picture: Pixels, x_source: Real, y_source: Real, width: int, height: int, edge_x: int, edge_y: int
 ):
-    """The pixel whose square holds the source."""
-    k = inside(k)
-    x, _tx = whole_and_fraction(source_x[k] + Real(0.5))
-    y, _ty = whole_and_fraction(source_y[k] + Real(0.5))
-    out[k] = pixel(picture, x, y, width, height, edge_x, edge_y)
+    """The pixel whose square contains the source."""
+    x, _tx = whole_and_fraction(x_source + Real(0.5))
+    y, _ty = whole_and_fraction(y_source + Real(0.5))
+    return pixel(picture, x, y, width, height, edge_x, edge_y)
 
 
-@cells
-def look_up_bilinear(
-    i: int,
-    j: int,
-    k: int,
-    picture: Pixels,
-    source_x: Field,
-    source_y: Field,
-    width: int,
-    height: int,
-    edge_x: int,
-    edge_y: int,
-    # outputs
-    out: Pixels,
+@wp.func
+def bilinear(
+    picture: Pixels, x_source: Real, y_source: Real, width: int, height: int, edge_x: int, edge_y: int
 ):
-    """Bilinear between the four pixels around the source."""
-    k = inside(k)
-    x, tx = whole_and_fraction(source_x[k])
-    y, ty = whole_and_fraction(source_y[k])
+    """Bilinear interpolation between the four pixels around the source."""
+    x, tx = whole_and_fraction(x_source)
+    y, ty = whole_and_fraction(y_source)
     sx = Real(1.0) - tx
+    north = Pixel()
+    south = Pixel()
     if x >= 0 and y >= 0 and x + 1 < width and y + 1 < height:
-        at = entry(y * width + x)
+        first = entry(y * width + x)
         below = entry(y * width + width + x)
-        north = sx * picture[at] + tx * picture[at + 1]
+        north = sx * picture[first] + tx * picture[first + 1]
         south = sx * picture[below] + tx * picture[below + 1]
-        out[k] = (Real(1.0) - ty) * north + ty * south
     else:
         north = sx * pixel(picture, x, y, width, height, edge_x, edge_y)
         north += tx * pixel(picture, x + 1, y, width, height, edge_x, edge_y)
         south = sx * pixel(picture, x, y + 1, width, height, edge_x, edge_y)
         south += tx * pixel(picture, x + 1, y + 1, width, height, edge_x, edge_y)
-        out[k] = (Real(1.0) - ty) * north + ty * south
+    return (Real(1.0) - ty) * north + ty * south
 
 
 _REAL = f"wp::{Real.__name__}"
 _CUBIC_INSIDE = f"""
-    __builtin_assume(at >= 0);
+    __builtin_assume(first >= 0);
     wp::vec_t<4, {_REAL}> value;
 #if defined(__CUDA_ARCH__)
     typedef wp::vec_t<4, {_REAL}> four;
@@ -191,7 +174,7 @@ _CUBIC_INSIDE = f"""
     const four c2 = {{1, -2.5, 2, -0.5}}, c3 = {{-0.5, 1.5, -1.5, 0.5}};
     const four x = c0 + tx * (c1 + tx * (c2 + tx * c3));
     const four y = c0 + ty * (c1 + ty * (c2 + ty * c3));
-    const four* p = (const four*)(picture.data + at);
+    const four* p = (const four*)(picture.data + first);
     four sum = y[0] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
     p += width;
     sum += y[1] * (x[0] * p[0] + x[1] * p[1] + x[2] * p[2] + x[3] * p[3]);
@@ -205,10 +188,10 @@ _CUBIC_INSIDE = f"""
 
 
 @wp.func_native(_CUBIC_INSIDE)
-def cubic_inside(picture: Pixels, at: int, width: int, tx: Real, ty: Real) -> Pixel:
-    """Catmull-Rom over 4 x 4 pixels that all lie inside the picture, `at` the first of them.
+def cubic_inside(picture: Pixels, first: int, width: int, tx: Real, ty: Real) -> Pixel:
+    """Catmull-Rom interpolation over 4 x 4 pixels, all inside the picture; `first` is the index of the first.
 
-    In native code, for the four channels side by side in one register: half the time.
+    Native code keeps the four channels in one register, which takes half the time.
     """
     ...
 
@@ -217,7 +200,7 @@ def cubic_inside(picture: Pixels, at: int, width: int, tx: Real, ty: Real) -> Pi
 def cubic_at_edges(
     picture: Pixels, x: int, y: int, tx: Real, ty: Real, width: int, height: int, edge_x: int, edge_y: int
 ):
-    """The same over pixels some of which lie beyond the picture's edges; (x, y) is the first."""
+    """Catmull-Rom interpolation over 4 x 4 pixels from (x, y) on, some beyond the picture's edges."""
     wx = cubic_weights(tx)
     wy = cubic_weights(ty)
     value = Pixel()
@@ -230,29 +213,17 @@ def cubic_at_edges(
     return value
 
 
-@cells
-def look_up_cubic(
-    i: int,
-    j: int,
-    k: int,
-    picture: Pixels,
-    source_x: Field,
-    source_y: Field,
-    width: int,
-    height: int,
-    edge_x: int,
-    edge_y: int,
-    # outputs
-    out: Pixels,
-):
-    """Catmull-Rom over the sixteen pixels around the source."""
-    k = inside(k)
-    x, tx = whole_and_fraction(source_x[k])
-    y, ty = whole_and_fraction(source_y[k])
+@wp.func
+def cubic(picture: Pixels, x_source: Real, y_source: Real, width: int, height: int, edge_x: int, edge_y: int):
+    """Catmull-Rom interpolation over the sixteen pixels around the source."""
+    x, tx = whole_and_fraction(x_source)
+    y, ty = whole_and_fraction(y_source)
+    value = Pixel()
     if x >= 1 and y >= 1 and x + 2 < width and y + 2 < height:
-        out[k] = cubic_inside(picture, (y - 1) * width + x - 1, width, tx, ty)
+        value = cubic_inside(picture, (y - 1) * width + x - 1, width, tx, ty)
     else:
-        out[k] = cubic_at_edges(picture, x - 1, y - 1, tx, ty, width, height, edge_x, edge_y)
+        value = cubic_at_edges(picture, x - 1, y - 1, tx, ty, width, height, edge_x, edge_y)
+    return value
 
 
 PI = wp.constant(Real(3.14159265358979323846))
@@ -268,25 +239,13 @@ def lanczos_weight(x: Real):
     return weight
 
 
-@cells
-def look_up_lanczos(
-    i: int,
-    j: int,
-    k: int,
-    picture: Pixels,
-    source_x: Field,
-    source_y: Field,
-    width: int,
-    height: int,
-    edge_x: int,
-    edge_y: int,
-    # outputs
-    out: Pixels,
+@wp.func
+def lanczos(
+    picture: Pixels, x_source: Real, y_source: Real, width: int, height: int, edge_x: int, edge_y: int
 ):
-    """Lanczos-3 over the thirty-six pixels around the source, weights normalised to one."""
-    k = inside(k)
-    x, tx = whole_and_fraction(source_x[k])
-    y, ty = whole_and_fraction(source_y[k])
+    """Lanczos-3 over the thirty-six pixels around the source; the weights are scaled to a sum of 1."""
+    x, tx = whole_and_fraction(x_source)
+    y, ty = whole_and_fraction(y_source)
     value = Pixel()
     total = Real(0.0)
     for m in range(6):
@@ -299,4 +258,37 @@ def look_up_lanczos(
             row += wx
         value += wy * line
         total += wy * row
-    out[k] = value / total
+    return value / total
+
+
+def _look_up(interpolate: wp.Function) -> Program:
+    @cells
+    def look_up(
+        i: int,
+        j: int,
+        k: int,
+        picture: Pixels,
+        source_x: Field,
+        source_y: Field,
+        width: int,
+        height: int,
+        edge_x: int,
+        edge_y: int,
+        # outputs
+        out: Pixels,
+    ):
+        """out = the value of the picture (height rows of width pixels) at the source of pixel k.
+
+        source_x and source_y [px] count from the centre of the first pixel; edge_x and edge_y are `CLAMP`,
+        `MIRROR`, `WRAP` or another number for a picture that is 0 beyond its edges.
+        """
+        k = inside(k)
+        out[k] = interpolate(picture, source_x[k], source_y[k], width, height, edge_x, edge_y)
+
+    return look_up
+
+
+look_up_nearest = _look_up(nearest)
+look_up_bilinear = _look_up(bilinear)
+look_up_cubic = _look_up(cubic)
+look_up_lanczos = _look_up(lanczos)

@@ -1,4 +1,4 @@
-"""What a frame is judged by: sums and extremes, one row a line; the host combines the rows."""
+"""Figures of a frame: extremes and counts of each row, one row per line; the host combines the rows."""
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
@@ -21,8 +21,8 @@ def row_map_extremes(
     jacobian_max: Field,
     outside: Field,
 ):
-    """Of row t of the map: least and greatest det of its Jacobian (central differences, displacement
-    in cells) and the number of cells whose source lies beyond a closed edge.
+    """For row t of the map: least and greatest determinant of its Jacobian (central differences of the
+    displacement [cells] at centres), and the number of cells whose source is beyond a closed edge.
     """
     least = Real(1.0e30)
     greatest = Real(-1.0e30)

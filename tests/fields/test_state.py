@@ -29,3 +29,13 @@ def test_a_number_that_is_not_finite_is_found_in_every_array(device):
         fill(np.nan, f)
         assert not state.finite
         fill(0.0, f)
+
+
+def test_every_array_takes_its_gradient_from_the_same_array_of_another_state(device):
+    grid = Grid(6, 5, 1.0, 1.0)
+    state, bar = (State.at_rest(grid, device, densities=2, points=3) for _ in range(2))
+    state.take_gradient(bar)
+    for n, f in enumerate(bar.arrays, start=1):
+        fill(float(n), f)
+    assert [float(f.grad.numpy()[0]) for f in state.arrays] == [*range(1, 10)]
+    assert [float(rho.grad.numpy()[0]) for rho in state.rho] == [float(rho.numpy()[0]) for rho in bar.rho]

@@ -92,6 +92,15 @@ ORIGINAL_ANNOTATIONS = {
 }
 
 
+def test_programs_of_one_source_have_a_kernel_each():
+    """Warp tells the kernels of a module apart by name: each name is that of one program and its variant."""
+    made = [kernel for param in programs() for kernel in param.values[0].kernels.values()]
+    keys = [(kernel.module.name, kernel.key) for kernel in made]
+    assert len(keys) == len(set(keys)) > 100
+    for variant in ("cubic", "bilinear"):
+        assert ("wfluid.cpu", f"advection_advect_face_{variant}_{SPAN}") in keys
+
+
 @pytest.mark.parametrize("name", [FORWARD, ADJOINT])
 def test_every_kernel_compiles_for_cuda_without_a_gpu(tmp_path, name):
     """NVRTC comes with Warp: the CUDA modules build ahead of time on any machine."""

@@ -1,4 +1,4 @@
-"""Limited-memory BFGS finds the minima that others find, as soon, and ends well where functions misbehave."""
+"""L-BFGS finds the minima that SciPy finds, as fast, and ends with the right status."""
 
 import json
 import math
@@ -15,11 +15,12 @@ from hypothesis import strategies as st
 from more_garbow_hillstrom import PROBLEMS
 from scipy.optimize import least_squares
 
-from wfluid.optimize.lbfgs import Iterate, Minimum, Settings, Status, descent_direction, minimise
+from wfluid.optimize.lbfgs import Iterate, Minimum, descent_direction, minimise
 from wfluid.optimize.line_search import Ending, Rules, Sample, search
+from wfluid.optimize.settings import Settings, Status
 
 LIMITS = {"iterations": 10_000, "evaluations": 10_000}
-"""Wide enough never to be met."""
+"""Limits that no test reaches."""
 
 BY_NAME = {problem.name: problem for problem in PROBLEMS}
 
@@ -41,7 +42,7 @@ print(json.dumps(found))
 
 
 class Recorded:
-    """A function that keeps what it was asked and what it answered."""
+    """A function that records its arguments and results."""
 
     def __init__(self, function):
         self.function, self.points = function, []
@@ -92,7 +93,7 @@ def test_problems_have_the_jacobians_of_their_residuals(problem):
 def test_problems_have_the_published_minima(problem):
     """Levenberg and Marquardt's method from the standard start ends at a value of the paper.
 
-    It does not for two problems, whose zeros the paper tells: they are looked at there.
+    For two problems it does not; these are evaluated at the zeros that the paper gives.
     """
     known = {"Biggs EXP6": np.array([1.0, 10.0, 1.0, 5.0, 4.0, 3.0]), "Trigonometric 10": np.zeros(10)}
     start = known.get(problem.name, problem.start)
@@ -111,8 +112,8 @@ def test_problems_have_the_published_minima(problem):
 def scipys():
     """Value, evaluations and whether it converged, by problem, of SciPy's L-BFGS-B.
 
-    In a process of its own with one thread: those of its linear algebra wait seconds for each other where
-    a core is busy.
+    Computed in a separate process with one thread, because the threads of its linear algebra wait seconds
+    for each other on a busy core.
     """
     environment = os.environ | {"PYTHONPATH": str(SUPPORT), "OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run([sys.executable, "-c", SCIPY], env=environment, capture_output=True, check=True)
@@ -125,14 +126,14 @@ def ours():
 
 
 @every_problem
-def test_the_minimum_is_the_one_that_scipy_finds(problem, ours, scipys):
+def test_the_minimum_equals_that_of_scipy(problem, ours, scipys):
     """Same memory, start and tolerance: f = f_SciPy where SciPy converges, f <= f_SciPy where it gives up.
 
-    From the standard starts it gives up on Powell's badly scaled problem and Meyer's short of the minimum,
-    on Jennrich and Sampson's far from it, on Brown and Dennis's at it. Meyer's largest slope cannot come
-    below 1e-6, at values of f near 100 and x of 6000: there precision ends the search, at the paper's value.
-    Of two minima that the paper gives both methods find the same: the higher of Freudenstein and Roth's and
-    of Biggs's, and the trigonometric problem's local one, 2.8e-5, of which the paper does not tell.
+    From the standard starts SciPy gives up on Powell's badly scaled problem and Meyer's before the minimum,
+    on Jennrich and Sampson's far from it, and on Brown and Dennis's at it. The largest slope of Meyer's
+    problem cannot fall below 1e-6 (f near 100, x near 6000): rounding ends the search at the paper's value.
+    Where a problem has two minima, both methods find the same one: the higher one of Freudenstein and Roth's
+    and of Biggs's problem, and a local one of the trigonometric problem, 2.8e-5, that the paper omits.
     """
     found, (value, _, converged) = ours[problem.name], scipys[problem.name]
     room = 3e-5 * value + 2e-8
@@ -183,7 +184,7 @@ def test_two_loops_are_the_inverse_hessian_of_bfgs():
     assert np.array_equal(gradient, before)
 
 
-def test_on_a_quadratic_it_goes_where_conjugate_gradients_go():
+def test_iterates_on_a_quadratic_are_those_of_conjugate_gradients():
     """With exact searches the iterates of f = x'A x / 2 - b.x are those of conjugate gradients, which end in
     as many iterations as A has different eigenvalues (Nocedal and Wright, section 7.2 and theorem 5.4).
     """
@@ -216,7 +217,7 @@ def test_on_a_quadratic_it_goes_where_conjugate_gradients_go():
 
 
 def sampled(function):
-    """A function of a step that gives value and slope, as the search wants it."""
+    """A function of a step that returns value and slope in the form of the search."""
     return lambda step: Sample(step, *map(float, function(step)))
 
 
@@ -246,7 +247,7 @@ def wavy_corner(a, rounding=0.01, waves=39):
 
 
 def bends(one, other):
-    """Two bends, near 0 and near 1."""
+    """Two bends: one near 0, one near 1."""
 
     def function(a):
         left, right = math.hypot(a, one), math.hypot(1 - a, other)
@@ -271,7 +272,7 @@ def bends(one, other):
     ],
     ids=["table I", "table II", "table III", "table IV", "table V", "table VI"],
 )
-def test_the_search_takes_the_trials_that_its_authors_published(function, decrease, curvature, trials, steps):
+def test_the_search_takes_the_published_trials(function, decrease, curvature, trials, steps):
     """Moré and Thuente (1994), section 5: trials and steps from first steps 1e-3, 0.1, 10 and 1000."""
     rules = Rules(decrease, curvature, width=1e-10)
     for first, count, step in zip((1e-3, 0.1, 10.0, 1000.0), trials, steps.split(), strict=True):
@@ -293,7 +294,7 @@ def test_the_search_takes_the_trials_that_its_authors_published(function, decrea
     curvature=st.floats(0.01, 0.9),
 )
 def test_the_search_meets_the_strong_wolfe_conditions(waves, bowl, first, curvature):
-    """On any smooth function that is bounded below and falls at first, scaled to a slope of -1."""
+    """On random smooth functions that are bounded below and have slope -1 at 0."""
 
     def function(a):
         value = bowl * a**2 + sum(h * math.sin(k * a + p) for h, k, p in waves)
@@ -308,8 +309,8 @@ def test_the_search_meets_the_strong_wolfe_conditions(waves, bowl, first, curvat
     assert sampled(function)(found.sample.step) == found.sample
 
 
-def test_the_search_goes_back_from_where_there_is_nothing():
-    """phi(a) = -log(1 - a / edge) - 20 a / edge has its minimum at 0.95 edge: found from far beyond."""
+def test_the_search_shortens_steps_beyond_the_domain():
+    """phi(a) = -log(1 - a / edge) - 20 a / edge has its minimum at 0.95 edge; the first trial lies beyond."""
     edge = 1e-8
     trials = []
 
@@ -329,15 +330,15 @@ def test_the_search_goes_back_from_where_there_is_nothing():
     assert all(after < a for n, a in enumerate(trials) if a >= edge for after in trials[n + 1 :])
 
 
-def test_the_search_ends_at_the_edge_of_a_cliff():
-    """Falling without end until a = 1, nothing beyond: it comes within the width of the edge."""
+def test_the_search_ends_at_the_edge_of_the_domain():
+    """Decreasing up to a = 1 and not finite beyond: the search ends within the width from a = 1."""
     found = search(lambda a: Sample(a, -a if a < 1 else math.nan, -1.0), Sample(0.0, 0.0, -1.0), first=7.0)
     assert found.ending is Ending.NARROW
     assert 0.9 <= found.sample.step < 1
 
 
-def test_the_search_steps_over_a_hole_in_its_bracket():
-    """(a - 1)^2, nowhere near 1 first: nothing between 0.4 and 1.1, where interpolation goes at once."""
+def test_the_search_skips_a_gap_in_the_domain():
+    """(a - 1)^2, not finite between 0.4 and 1.1, where the first interpolation lies."""
     trials = []
 
     def along(a):
@@ -356,8 +357,8 @@ def test_the_search_of_an_unbounded_line_ends():
 
 
 def test_steps_grow_until_the_minimum_is_bracketed():
-    """Interpolation sees the minimum 5.5 of a parabola at once. From 1 it goes only 4 times the advance on,
-    from 5 at least 1.1 times, as the proof that searches end wants it (Moré and Thuente, section 2).
+    """Interpolation finds the minimum of a parabola, 5.5, at once. The next advance is at most 4 times and at
+    least 1.1 times the one before, as the proof of convergence requires (Moré and Thuente, section 2).
     """
     trials = []
 
@@ -370,7 +371,7 @@ def test_steps_grow_until_the_minimum_is_bracketed():
     assert found.ending is Ending.WOLFE
 
 
-def test_the_search_comes_back_from_where_it_is_lower_but_not_enough():
+def test_the_search_shortens_steps_without_sufficient_decrease():
     """phi(a) = (exp(-100 a) - 1) / 100 - a / 10^5 falls for ever, below a slope of -1/1000 only to a = 10."""
 
     def along(a):
@@ -381,7 +382,7 @@ def test_the_search_comes_back_from_where_it_is_lower_but_not_enough():
 
 
 def test_slopes_decide_where_values_are_rounding():
-    """phi = 1e6 + (a - 1)^2 / 1e11, of which values see nothing: the step is right by its slope."""
+    """phi = 1e6 + (a - 1)^2 / 1e11: values are constant to rounding, the slope identifies the step."""
     start = Sample(0.0, 1e6, -2e-11)
     found = search(lambda a: Sample(a, 1e6 + 1e-10, 2e-11 * (a - 1)), start, 1e6 * (1 + 1e-15), first=0.5)
     assert found.ending is Ending.APPROXIMATE_WOLFE
@@ -401,7 +402,7 @@ def test_slopes_decide_where_values_are_rounding():
 
 
 def barrier(x):
-    """x'x / 2 - sum log x, its minimum at 1, nothing where x <= 0."""
+    """x'x / 2 - sum log x: minimum at 1, not defined for x <= 0."""
     if (x <= 0).any():
         return math.nan, np.full(x.shape, math.nan)
     return float(x @ x / 2 - np.log(x).sum()), x - 1 / x
@@ -428,8 +429,8 @@ def barrier_below(x):
 @pytest.mark.parametrize(
     "function", [barrier, raising_barrier, infinite_barrier, barrier_without_gradient, barrier_below]
 )
-def test_where_a_function_is_not_finite_the_step_was_too_far(function):
-    """Not a number, infinite, raised, or without a gradient: the minimum is found all the same."""
+def test_steps_to_points_that_are_not_finite_are_shortened(function):
+    """NaN, infinite, an exception, or a gradient that is not finite: the minimum is still found."""
     for first_step in (1.0, 1e3, 1e9):
         found = minimise(function, np.array([0.01, 3.0, 17.0]), Settings(first_step=first_step))
         assert found.status is Status.CONVERGED, found.message
@@ -445,8 +446,8 @@ def test_where_a_function_is_not_finite_the_step_was_too_far(function):
             )
 
 
-def test_errors_that_the_caller_asked_numpy_for_reach_the_function():
-    """Its own arithmetic is silent, the function's is as loud as the caller wants it."""
+def test_the_callers_numpy_error_settings_hold_in_the_function():
+    """The minimiser ignores its own floating-point errors; the function's follow the caller's settings."""
     raised = []
 
     def function(x):
@@ -461,8 +462,8 @@ def test_errors_that_the_caller_asked_numpy_for_reach_the_function():
     assert found.status is Status.CONVERGED and raised
 
 
-def test_steps_beyond_all_numbers_are_too_far():
-    """Straight down for ever, so steep or in steps so long that the next x or slope is no number."""
+def test_steps_that_overflow_are_shortened():
+    """Linear descent, so steep or with steps so long that the next x or slope overflows."""
 
     def slope(x):
         return -float(x[0]), -np.ones(1)
@@ -482,7 +483,7 @@ def raising(x):
 
 
 @pytest.mark.parametrize("function", [raising, lambda x: (math.nan, x), lambda x: (1.0, x + math.inf)])
-def test_a_start_that_is_not_finite_is_told(function):
+def test_a_start_that_is_not_finite_has_its_status(function):
     found = minimise(function, np.ones(2))
     assert found.status is Status.NOT_FINITE
     assert (found.evaluations, found.iterations) == (1, 0)
@@ -497,16 +498,16 @@ def test_a_flat_function_is_at_its_minimum(tolerance):
 
 
 @pytest.mark.parametrize("function", [lambda x: (7.0, np.ones(3)), lambda x: (float(x @ x), -2 * x)])
-def test_a_gradient_that_values_deny_makes_no_progress(function):
-    """Flat where it should fall, or rising: the start is given back, and soon."""
+def test_a_gradient_that_contradicts_the_values_makes_no_progress(function):
+    """Values that are constant or rise along -g: the start is returned after few evaluations."""
     found = minimise(function, np.ones(3))
     assert found.status is Status.NO_PROGRESS
     assert found.evaluations <= 41
     assert np.array_equal(found.x, np.ones(3))
 
 
-def test_a_memory_that_leads_nowhere_is_dropped():
-    """After pairs of another function's, the next point is that of a first iteration, and the memory new."""
+def test_a_memory_without_descent_is_dropped():
+    """With pairs of another function, the next point is that of a first iteration; the memory is reset."""
     state = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=0)).state
     bad = replace(state, steps=(np.array([1.0, 2.0]),), differences=(np.array([-3.0, -1.0]),))
     found = minimise(rosenbrock, bad, Settings(iterations=1))
@@ -527,7 +528,7 @@ def test_a_memory_that_leads_nowhere_is_dropped():
     ids=["1e12", "1e200", "1e-200", "cosh"],
 )
 def test_steep_functions_end_at_their_minimum(function, start, tolerance):
-    """Scaled by 1e200 or 1e-200, or growing as exp(40 x): x comes to 0, and no arithmetic of ours warns."""
+    """Scaled by 1e200 or 1e-200, or growing as exp(40 x): x converges to 0 without warnings."""
 
     def quiet(x):
         with np.errstate(all="ignore"):
@@ -542,8 +543,8 @@ def test_steep_functions_end_at_their_minimum(function, start, tolerance):
 
 @pytest.mark.parametrize("name", ["Rosenbrock", "Bard", "Wood", "Meyer", "Osborne 2", "Powell badly scaled"])
 def test_single_precision_ends_within_its_noise(name):
-    """Value and gradient rounded to float32: f within 1e-5 of the minimum, in evaluations of no other order
-    than without rounding.
+    """With value and gradient rounded to float32, f is within 1e-5 of the minimum, after about as many
+    evaluations as without rounding.
     """
     problem = BY_NAME[name]
 
@@ -558,9 +559,9 @@ def test_single_precision_ends_within_its_noise(name):
     assert problem.value_and_gradient(found.x)[0] == pytest.approx(exact.value, rel=1e-5, abs=1e-9)
 
 
-def test_gradients_converge_beyond_what_values_can_tell():
-    """Brown and Dennis's f is 85822 at its minimum, so rounded to 1e-11, which slopes of 1e-5 cannot change:
-    the noise setting leads on to 1e-6.
+def test_the_gradient_converges_beyond_the_precision_of_values():
+    """Brown and Dennis's f is 85822 at its minimum, with rounding errors of 1e-11, above the changes due to
+    slopes of 1e-5: the noise setting lets the slopes converge to 1e-6.
     """
     problem = BY_NAME["Brown-Dennis"]
     assert minimise(problem.value_and_gradient, problem.start).status is Status.CONVERGED
@@ -570,7 +571,7 @@ def test_gradients_converge_beyond_what_values_can_tell():
 
 
 def test_only_pairs_of_positive_curvature_are_kept():
-    """Down a ridge that never ends, s.y is negative: pairs that say so would make H indefinite."""
+    """On an unbounded ridge s.y is negative: such pairs would make H indefinite."""
 
     def ridge(x):
         return x[0] ** 2 - x[1] ** 2, np.array([2 * x[0], -2 * x[1]])
@@ -590,8 +591,8 @@ def test_only_pairs_of_positive_curvature_are_kept():
 # What it gives back
 
 
-def test_a_callback_stops_it_at_a_point_that_is_one_and_the_same():
-    """x, value and gradient are those of one evaluation, the last of as many iterations as were wanted."""
+def test_a_callback_stops_at_the_point_of_one_evaluation():
+    """x, value and gradient belong to one evaluation: that of the iteration at which the callback stops."""
     found = minimise(rosenbrock, np.array([-1.2, 1.0]), callback=lambda state: state.iteration == 7)
     assert found.status is Status.STOPPED
     assert found.iterations == 7 and len(found.history) == 8
@@ -601,8 +602,8 @@ def test_a_callback_stops_it_at_a_point_that_is_one_and_the_same():
 
 @pytest.mark.parametrize("limit", [1, 2, 3, 5, 8, 13, 21, 34, 55, 89])
 @pytest.mark.parametrize("name", ["Rosenbrock", "Meyer", "Brown badly scaled", "Watson 9"])
-def test_a_limit_of_evaluations_is_kept_and_the_lowest_point_given(name, limit):
-    """However it falls within a line search."""
+def test_a_limit_of_evaluations_is_kept_and_the_lowest_point_returned(name, limit):
+    """Also if the limit is reached within a line search."""
     problem = BY_NAME[name]
     function = Recorded(problem.value_and_gradient)
     found = minimise(function, problem.start, Settings(evaluations=limit))
@@ -615,23 +616,23 @@ def test_a_limit_of_evaluations_is_kept_and_the_lowest_point_given(name, limit):
 
 
 @pytest.mark.parametrize("name", ["Wood", "Osborne 2", "Meyer"])
-def test_going_on_is_the_same_as_never_having_stopped(name):
-    """To the last bit, from any iteration, a limit of iterations, or one within a line search."""
+def test_resuming_equals_an_uninterrupted_minimisation(name):
+    """Bit-equal, from any iteration, after a limit of iterations, or one within a line search."""
     problem = BY_NAME[name]
     states = []
     settings = Settings(iterations=60, evaluations=1000)
-    whole = minimise(problem.value_and_gradient, problem.start, settings, states.append)
+    complete = minimise(problem.value_and_gradient, problem.start, settings, states.append)
     for state in states[:: len(states) // 6]:
-        assert same(minimise(problem.value_and_gradient, state, settings), whole)
+        assert same(minimise(problem.value_and_gradient, state, settings), complete)
     for stop in ({"iterations": 7}, {"evaluations": 11}, {"evaluations": 12}, {"evaluations": 13}):
         part = minimise(problem.value_and_gradient, problem.start, replace(settings, **stop))
         going_on = minimise(problem.value_and_gradient, part.state, settings)
-        assert same(going_on, whole) and going_on.evaluations == whole.evaluations
-        assert going_on.history == whole.history and going_on.status is whole.status
+        assert same(going_on, complete) and going_on.evaluations == complete.evaluations
+        assert going_on.history == complete.history and going_on.status is complete.status
 
 
-def test_a_state_remembers_the_lowest_point():
-    """One that a line search went through and left: it is given back unless a lower one is found."""
+def test_a_state_keeps_the_lowest_point():
+    """A point that a line search tried but did not end at is returned unless a lower one is found."""
     state = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=3)).state
     lower = minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(iterations=20)).point
     found = minimise(rosenbrock, replace(state, best=lower), Settings(iterations=5))
@@ -645,8 +646,8 @@ def test_limits_of_iterations_are_kept():
         assert found.status is Status.ITERATIONS and found.iterations == limit
 
 
-def test_a_small_change_ends_it():
-    """The last relative decrease is at most the tolerance, all before are more."""
+def test_a_small_change_ends_the_minimisation():
+    """The last relative decrease is at most the tolerance, all earlier ones exceed it."""
     settings = Settings(change_tolerance=1e-3, gradient_tolerance=0.0)
     found = minimise(BY_NAME["Brown-Dennis"].value_and_gradient, BY_NAME["Brown-Dennis"].start, settings)
     assert found.status is Status.SMALL_CHANGE
@@ -655,8 +656,8 @@ def test_a_small_change_ends_it():
     assert changes[-1] <= 1e-3 < changes[:-1].min()
 
 
-def test_the_memory_is_as_long_as_asked_and_of_the_last_pairs():
-    """s = x_(k+1) - x_k and y likewise, the last three of them."""
+def test_the_memory_holds_the_last_pairs():
+    """s = x_(k+1) - x_k and y = g_(k+1) - g_k, for the last three iterations."""
     seen = []
     minimise(rosenbrock, np.array([-1.2, 1.0]), Settings(memory=3), seen.append)
     for position, state in enumerate(seen[3:20], start=3):
@@ -667,16 +668,16 @@ def test_the_memory_is_as_long_as_asked_and_of_the_last_pairs():
 
 
 @pytest.mark.parametrize("length", [1e-4, 0.5])
-def test_the_first_trial_is_as_far_as_asked_straight_downhill(length):
+def test_the_first_trial_is_a_step_of_first_step_along_the_negative_gradient(length):
     function = Recorded(rosenbrock)
     minimise(function, np.array([-1.2, 1.0]), Settings(first_step=length, evaluations=2))
     (start, _, gradient), (trial, _, _) = function.points
     np.testing.assert_allclose(trial - start, -length * gradient / np.linalg.norm(gradient), rtol=1e-9)
 
 
-def test_nobody_can_change_what_another_holds():
-    """A function that scribbles on its argument and uses one array for all gradients, as a simulation may,
-    has the same minimum; the start is left as it was; a callback cannot write.
+def test_arrays_are_not_shared_with_the_function():
+    """A function that overwrites its argument and reuses one array for all gradients has the same minimum;
+    the start is unchanged; a callback cannot write to the state.
     """
     buffer = np.zeros(2)
 
@@ -695,7 +696,7 @@ def test_nobody_can_change_what_another_holds():
     assert np.array_equal(start, [-1.2, 1.0]) and start.flags.writeable
 
 
-def test_an_interrupt_goes_through():
+def test_an_interrupt_propagates():
     def interrupted(x):
         raise KeyboardInterrupt
 
@@ -703,7 +704,7 @@ def test_an_interrupt_goes_through():
         minimise(interrupted, np.ones(2))
 
 
-def test_the_message_says_how_it_ended():
+def test_the_message_names_the_status():
     assert minimise(quadratic, np.array([3.0, 4.0])).message.startswith("converged after ")
 
 
@@ -732,7 +733,7 @@ def test_settings_outside_their_range_are_refused(setting, rule):
 
 
 @pytest.mark.parametrize("start", [np.ones((2, 2)), np.ones(0), np.array([1.0, math.nan]), 3.0])
-def test_starts_that_are_no_vectors_are_refused(start):
+def test_starts_that_are_not_vectors_are_refused(start):
     with pytest.raises(ValueError, match="the start must be a vector of finite numbers, not"):
         minimise(quadratic, start)
 
@@ -742,7 +743,7 @@ def test_gradients_of_another_shape_are_refused():
         minimise(lambda x: (0.0, np.ones(3)), np.ones(2))
 
 
-def test_a_state_tells_where_it_is():
+def test_a_state_gives_its_point():
     states: list[Iterate] = []
     minimise(quadratic, np.array([3.0, 4.0]), callback=states.append)
     for number, state in enumerate(states, start=1):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from oracles import from_streamfunction
 
-from wfluid.domain.envelopes import Constant, Instantaneous, Oscillator
+from wfluid.domain.envelopes import Constant, Instantaneous
 from wfluid.domain.grid import Grid
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.paths import Path
 from wfluid.fields.arrays import to_numpy
 from wfluid.model.densities import Density, PaintedSource, Source

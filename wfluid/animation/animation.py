@@ -11,9 +11,9 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
-from wfluid.domain.grid import CELLS, CELLS_LIMIT, LEAST_CELLS, Grid
-from wfluid.domain.limits import SIZE_LIMIT
-from wfluid.domain.timeline import FPS, Timeline
+from wfluid.domain.grid import Grid
+from wfluid.domain.limits import CELLS, CELLS_LIMIT, FPS, LEAST_CELLS, SIZE_LIMIT
+from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
@@ -30,7 +30,7 @@ from wfluid.view.quality import measure_map
 class Animation:
     """A picture, a fluid, forces and a timeline; iterate over `frames()` to run it.
 
-    Nothing is computed before the first frame is asked for, and no frame is kept.
+    Frames are computed one by one when they are requested, and are not stored.
 
     Raises:
         ValueError: a value outside its range, or a loop that does not suit the forces.
@@ -53,7 +53,7 @@ class Animation:
     filter: str = FILTER
     """Interpolation between the picture's pixels: "nearest", "bilinear", "cubic", "lanczos"."""
     edge: str = EDGE
-    """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
+    """Values beyond the edges: "clamp", "mirror", "wrap", "transparent"; periodic axes always wrap."""
     device: str | None = None
     """"cpu" (default), "cuda", "cuda:1", …"""
     layers: Mapping[str, Picture] = field(default_factory=dict)
@@ -83,17 +83,17 @@ class Animation:
 
     @property
     def frame_count(self) -> int:
-        """Frames shown: both ends included, but for the last of a loop, which is the first."""
+        """Number of frames, both ends included; a loop omits its last frame, which equals the first."""
         return self.timeline.frames if self.loop is None else self._loop_frames
 
     @property
     def grid(self) -> Grid:
-        """The fluid's grid."""
+        """The grid of the fluid."""
         return Grid.for_picture(self.picture.width, self.picture.height, self.cells)
 
     @cached_property
     def solver(self) -> Solver:
-        """The solver; asking for it opens the device and loads the kernels."""
+        """The solver; the first access opens the device and loads the kernels."""
         return Solver(self.grid, self.fluid, open_device(self.device))
 
     def _moments(self, seam: Seam | None) -> Iterator[SimulatedFrame]:
@@ -104,7 +104,7 @@ class Animation:
         return loop_frames(self.loop, simulation, self._acting, self._loop_frames, self.timeline.fps, seam)
 
     def look_up(self, picture: Picture) -> LookUp:
-        """A look-up in a picture, which is shrunk first where frames are smaller, against aliasing."""
+        """A look-up of a picture; if frames are smaller, the picture is reduced first, against aliasing."""
         width, height = self.width or self.picture.width, self.height or self.picture.height
         return LookUp(
             picture.shrunk(width, height),
@@ -118,7 +118,7 @@ class Animation:
         )
 
     def frames(self) -> Run[Frame]:
-        """A run of the animation from rest: an iterator of its frames, with its times and its seam."""
+        """A run of the animation from rest: an iterator of its frames, with computing times and the seam."""
         seconds, seam = RunTimes(), None if self.loop is None else Seam()
         return Run(self._frames(seconds, seam), self.frame_count, seconds, seam)
 
@@ -166,7 +166,7 @@ def animate(
     substeps: int | None = None,
     **settings,
 ) -> Run[Frame]:
-    """Frames of `picture` moved by `forces` for `duration` seconds, made as they are asked for.
+    """Frames of `picture` moved by `forces` for `duration` seconds, computed when they are requested.
 
     `settings` are those of `Animation`: cells, width, height, filter, edge, device, layers, points, loop.
 

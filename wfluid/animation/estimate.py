@@ -12,17 +12,17 @@ from wfluid.animation.run import QUEUED_FRAMES
 from wfluid.system.memory import free_memory, readable_size
 
 FIELDS, COUPLED_FIELDS = 77, 114
-"""Arrays of the finest grid's size that solver, multigrid levels and two states take: diffusion of separate
-components, and of coupled ones."""
+"""Number of arrays of the finest grid's size in the solver, the multigrid levels and two states, for
+diffusion of independent and of coupled components."""
 
 FIELDS_PER_PIXEL = 3
-"""Arrays of the frames' size: two coordinates, and one channel being copied out."""
+"""Number of arrays of the frames' size: two coordinates, and one channel being copied."""
 
 SECONDS_PER_CELL_STEP, COUPLED_SECONDS = 100e-9, 400e-9
 SECONDS_PER_PIXEL = 40e-9
 
 FRAMES_IN_FLIGHT = QUEUED_FRAMES + 2
-"""Frames in memory: those that wait, the one being computed and the one being written."""
+"""Frames in memory: the queue, the frame being computed and the frame being written."""
 
 PROGRAM = 240e6
 """Memory of Python and the libraries before the first array [bytes]."""
@@ -50,7 +50,7 @@ class Estimate:
 
 
 def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> Estimate:
-    """Memory and time of an animation, or of a morph of so many frames, from sizes alone.
+    """Memory and time of an animation, or of a morph with `morph_frames` frames, from sizes alone.
 
     `frames_kept` is the number of outputs that keep all frames until the last: a GIF's palette needs them.
     """
@@ -83,10 +83,10 @@ def estimate(animation: Animation, frames_kept: int = 0, morph_frames: int | Non
 
 
 def check_memory(animation: Animation, frames_kept: int = 0, morph_frames: int | None = None) -> None:
-    """Refuse an animation that exceeds the free memory.
+    """Check that the free memory suffices for an animation.
 
     Raises:
-        ValueError: with the memory that it needs and that is free.
+        ValueError: it does not; the message gives the memory needed, the free memory and the remedy.
     """
     need, there = estimate(animation, frames_kept, morph_frames).memory, free_memory()
     if need > there:

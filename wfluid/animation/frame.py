@@ -19,7 +19,7 @@ class Frame:
     index: int
     """Number of the frame, from 0."""
     time: float
-    """Its time [s]."""
+    """Time of the frame [s]."""
     picture: Picture
     """The warped picture with the densities over it; in frame 0 the untouched picture."""
     map: CoordinateMap

@@ -21,9 +21,10 @@ import numpy as np
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.checks import check_word
-from wfluid.domain.envelopes import Envelope, Instantaneous, Oscillator, Product, product
+from wfluid.domain.envelopes import Envelope, Instantaneous, Product, product
+from wfluid.domain.limits import LOOPS
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.piecewise import ease
-from wfluid.domain.timeline import LOOPS
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import Growth
 from wfluid.model.noise_force import NoiseForce
@@ -40,23 +41,24 @@ class Seam:
     position_max: float = 0.0
     """Largest distance between the first frame and what would follow the last [longer side]."""
     position_mean: float = 0.0
-    """Its mean."""
+    """Mean of that distance [longer side]."""
     velocity_max: float = 0.0
     """Largest difference between the motion from the first frame and that into it [longer side/s]; at the
     far turn of a pingpong, if it is larger there."""
     velocity_mean: float = 0.0
-    """Its mean."""
+    """Mean of that difference [longer side/s]."""
     drift_max: float = 0.0
     """Largest drift that was subtracted from an oscillating loop [longer side]."""
     drift_mean: float = 0.0
-    """Its mean."""
+    """Mean of that drift [longer side]."""
 
 
 def check_loop(loop: str, forces: Sequence[Force]) -> None:
-    """Refuse an unknown loop, or one to oscillate without an oscillating force.
+    """Check a kind of loop against the forces.
 
     Raises:
-        ValueError: with the known loops, or the remedy.
+        ValueError: an unknown kind, or "oscillate" without an oscillating force; the message gives the
+        remedy.
     """
     check_word("loop", loop, LOOPS)
     if loop == "oscillate" and not any(_oscillates(force) for force in forces):
@@ -77,7 +79,7 @@ def fit_to_loop(force: Force, length: float) -> Force:
 
 
 def fitted_period(period: float, length: float) -> float:
-    """The nearest period of which a whole number fills `length`."""
+    """The nearest period that divides `length` into an integer number of periods [s]."""
     return length / max(1, round(length / period))
 
 

@@ -1,4 +1,4 @@
-"""Checks of values that a user gives. Loads no numpy."""
+"""Checks of a user's values. Loads no numpy."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 
 def check_word(name: str, value: object, known: Sequence[str], error: type[ValueError] = ValueError) -> None:
-    """Refuse a word that is not one of those known.
+    """Check that a value is one of the known words.
 
     Raises:
-        ValueError: with the known words; or the `error` that is given.
+        ValueError: it is not; the message lists the known words. `error` replaces the type.
     """
     if value not in known:
         raise error(f"{name} {value!r}: expected one of {', '.join(known)}")

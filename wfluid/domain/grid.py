@@ -1,24 +1,20 @@
-"""The fluid's grid: cells over the picture's rectangle."""
+"""The grid of the fluid: cells over the rectangle of the picture."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-LEAST_CELLS = 4
-"""Cells along an axis below which a cubic stencil no longer fits."""
-
-CELLS, CELLS_LIMIT = 256, 8192
-"""Cells along the longer side where nothing says it, and the most there may be: indices are 32-bit."""
+from wfluid.domain.limits import CELLS, LEAST_CELLS
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A staggered grid of nx by ny cells over a domain of width by height.
+    """A staggered (MAC) grid of nx by ny cells over a domain of width by height.
 
-    One unit of length is the picture's longer side; x points right, y down, the origin is the
-    picture's top-left corner. The walls lie exactly on the picture's edges, so hx and hy differ
-    slightly for most pictures.
+    The unit of length is the longer side of the picture. x points right, y down; the origin is the top left
+    corner of the picture. The walls lie exactly on its edges, so that hx and hy differ slightly for most
+    pictures.
 
     Raises:
         ValueError: fewer than 4 cells along an axis, or a size that is not positive and finite.
@@ -35,7 +31,9 @@ class Grid:
 
     def __post_init__(self) -> None:
         if min(self.nx, self.ny) < LEAST_CELLS:
-            raise ValueError(f"a grid of {self.nx} x {self.ny} cells: at least {LEAST_CELLS} each way")
+            raise ValueError(
+                f"a grid of {self.nx} x {self.ny} cells: expected {LEAST_CELLS} or more along each axis"
+            )
         for name, length in (("width", self.width), ("height", self.height)):
             if not (math.isfinite(length) and length > 0):
                 raise ValueError(f"grid {name} {length}: expected a positive, finite length")
@@ -50,10 +48,10 @@ class Grid:
 
     @property
     def hx(self) -> float:
-        """Width of a cell."""
+        """Width of a cell [longer side]."""
         return self.width / self.nx
 
     @property
     def hy(self) -> float:
-        """Height of a cell."""
+        """Height of a cell [longer side]."""
         return self.height / self.ny

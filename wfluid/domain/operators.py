@@ -1,4 +1,4 @@
-"""NumPy operators on grids: Gaussian blur, means with the neighbour before."""
+"""NumPy operators on a grid: Gaussian blur, and means of neighbours from centres to faces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from wfluid.domain.grid import Grid
 
 
 def blurred(values: np.ndarray, grid: Grid, radius: float, periodic: tuple[bool, bool]) -> np.ndarray:
-    """The values at centres under a Gaussian of sigma `radius`, whose weights sum to one at every wall."""
+    """Values at centres (ny, nx), blurred by a Gaussian of sigma `radius` [longer side].
+
+    At a closed wall the weights are normalised, so that a constant stays constant; a periodic axis wraps.
+    """
     for axis, (n, h, wraps) in enumerate(((grid.ny, grid.hy, periodic[1]), (grid.nx, grid.hx, periodic[0]))):
         if radius < 0.1 * h:
             continue
@@ -22,12 +25,12 @@ def blurred(values: np.ndarray, grid: Grid, radius: float, periodic: tuple[bool,
 
 
 def mean_with_before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
-    """The mean of each value and the one before it along an axis: from centres to faces."""
+    """The mean of each value and its predecessor along an axis: from centres to faces, in the same shape."""
     return (values + before(values, axis, wraps)) / 2
 
 
 def before(values: np.ndarray, axis: int, wraps: bool) -> np.ndarray:
-    """The value before each along an axis; before the first its own, or the last where the axis wraps."""
+    """The predecessor of each value along an axis; that of the first is itself, or the last if it wraps."""
     if wraps:
         return np.roll(values, 1, axis)
     first = values.take([0], axis)

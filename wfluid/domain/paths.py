@@ -1,4 +1,4 @@
-"""Points that move: where a force is at a time."""
+"""Paths: positions of points over time, such as the center of a force."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True)
 class Path:
-    """A place at each of some times, straight lines between them, at rest before and after.
+    """A moving point: places at given times, interpolated linearly, constant before and after.
 
     Raises:
-        ValueError: fewer than two places, as many times as places not given, times that do not
+        ValueError: fewer than two places, different numbers of times and places, times that do not
             increase, or a number that is not finite.
     """
 
     times: Sequence[float]
-    """When [s], increasing."""
+    """Times [s], increasing, (n,)."""
     places: Sequence[Place]
-    """Where (x, y) [longer side]."""
+    """Places x, y at `times` [longer side], (n, 2)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", tuple(float(t) for t in self.times))
@@ -40,18 +40,19 @@ class Path:
         for t in self.times:
             finite("Path.times", t)
         if any(b <= a for a, b in itertools.pairwise(self.times)):
-            raise ValueError("Path: times do not increase")
+            raise ValueError("Path: expected times that increase")
 
     @classmethod
     def along(cls, places: Sequence[Place], start: float, end: float) -> Path:
-        """Along a polyline from `start` to `end` at one speed.
+        """A path along a polyline at constant speed, from `start` to `end` [s].
 
         Raises:
-            ValueError: fewer than two places, two equal ones in a row, or an end that is not after the start.
+            ValueError: fewer than two places, two equal places in a row, or an end that is not after the
+                start.
         """
         lengths = [math.dist(a, b) for a, b in itertools.pairwise(places)]
         if not lengths or min(lengths) == 0:
-            raise ValueError("Path: expected two places or more, each other than the one before")
+            raise ValueError("Path: expected two or more places, each different from the one before")
         if not end > start:
             raise ValueError(f"Path: end {end} is not after start {start}")
         way = list(itertools.accumulate(lengths, initial=0.0))
@@ -65,23 +66,23 @@ class Path:
 
 
 Center = Place | Path | Callable[[float], Place]
-"""Where a force is: one place, a `Path`, or a function of the time [s]."""
+"""Center of a force: a fixed place, a `Path`, or a function of the time [s] that returns a place."""
 
 
 def as_center(name: str, center: Center) -> Center:
-    """A center, checked.
+    """A checked center; `name` is what messages call it.
 
     Raises:
-        ValueError: not two finite numbers.
+        ValueError: a fixed place that is not two finite numbers.
     """
     return center if isinstance(center, Path) or callable(center) else place(name, center)
 
 
 def place_at(center: Center, t: float) -> Place:
-    """Where a center is at time t [s].
+    """The place of a center at time t [s].
 
     Raises:
-        ValueError: a function gave no two finite numbers.
+        ValueError: a function returned something other than two finite numbers.
     """
     if isinstance(center, Path):
         return center.at(t)
@@ -89,9 +90,10 @@ def place_at(center: Center, t: float) -> Place:
 
 
 def center_slopes(center: Center, t: float, bar: Place) -> Slopes:
-    """The gradient with respect to a center's numbers, from `bar`, that to where it is at time t [s].
+    """The gradient with respect to a center's parameters, from `bar`, the gradient with respect to its place.
 
-    "center" (2,), or "center.places" (k, 2) of a path; a function's numbers are its own.
+    The place is that at t [s]. The names are "center" (2,), or "center.places" (k, 2) for a path; a function
+    has none, as its parameters are unknown.
     """
     if isinstance(center, Path):
         return {"center.places": np.outer(hats(center.times, t), bar)}
@@ -99,10 +101,10 @@ def center_slopes(center: Center, t: float, bar: Place) -> Slopes:
 
 
 def place(name: str, values: Sequence[float]) -> Place:
-    """Two finite numbers, as floats.
+    """Two finite numbers as floats; `name` is what messages call them.
 
     Raises:
-        ValueError: naming what they are for.
+        ValueError: another count, or a number that is not finite.
     """
     values = tuple(float(value) for value in values)
     if len(values) != 2:

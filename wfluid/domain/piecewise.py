@@ -1,4 +1,4 @@
-"""Functions of one variable that are put together from pieces: lines, ramps, cubics; checks of numbers."""
+"""Piecewise functions of one variable: linear interpolation, ramps, cubics; and a check of numbers."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Number = TypeVar("Number", float, np.ndarray)
 
 
 def interval(times: Sequence[float], t: float) -> tuple[int, int, float]:
-    """Two of some increasing times that t lies between, by number, and the part of the way, 0 … 1.
+    """The indices of the two times around t, and the fraction of the interval that has passed, 0 … 1.
 
-    Before the first, and from the last on, both are that one.
+    `times` increase. Before the first time, and from the last on, both indices are equal; the fraction is 0.
     """
     after = bisect_right(times, t)
     if after in (0, len(times)):
@@ -25,13 +25,13 @@ def interval(times: Sequence[float], t: float) -> tuple[int, int, float]:
 
 
 def lerp_at(times: Sequence[float], values: Sequence[float], t: float) -> float:
-    """The value at time t [s] on straight lines between samples; the first before them, the last after."""
+    """Linear interpolation of samples at time t [s]; constant before the first and after the last."""
     n, m, s = interval(times, t)
     return values[n] + s * (values[m] - values[n])
 
 
 def hats(times: Sequence[float], t: float) -> np.ndarray:
-    """How much each of n samples counts in `lerp_at`, (n,); 1 in sum."""
+    """The weights of n samples in `lerp_at`, (n,); their sum is 1."""
     n, m, s = interval(times, t)
     weights = np.zeros(len(times))
     weights[m] = s
@@ -40,14 +40,15 @@ def hats(times: Sequence[float], t: float) -> np.ndarray:
 
 
 def ease(s: Number) -> Number:
-    """3 s^2 - 2 s^3 for s of 0 … 1: from 0 to 1, level at both ends."""
+    """3 s^2 - 2 s^3 for s in 0 … 1: a ramp from 0 to 1 with zero slope at both ends."""
     return s * s * (3.0 - 2.0 * s)
 
 
 def catmull_rom(t: np.ndarray) -> np.ndarray:
-    """Weights (4, …) of four points in a row of a cubic, t past the second, 0 … 1 (E. Catmull, R. Rom, 1974).
+    """Weights (4, …) of four neighbouring points in Catmull-Rom interpolation, for t in 0 … 1.
 
-    `kernels/step/interpolation.py` has the same.
+    t is the distance from the second point, in units of the spacing (E. Catmull, R. Rom, 1974). The kernels'
+    version is in `kernels/step/interpolation.py`.
     """
     s = 1.0 - t
     outer, inner = (lambda t: t * (-0.5 + t * (1.0 - 0.5 * t))), (lambda t: 1.0 + t * t * (-2.5 + 1.5 * t))
@@ -55,10 +56,10 @@ def catmull_rom(t: np.ndarray) -> np.ndarray:
 
 
 def finite(name: str, value: float) -> None:
-    """Refuse what is no finite number.
+    """Check that a number is finite; `name` is what the message calls it.
 
     Raises:
-        ValueError: with the name and the value.
+        ValueError: it is infinite or NaN.
     """
     if not math.isfinite(value):
         raise ValueError(f"{name} is {value}: expected a finite number")

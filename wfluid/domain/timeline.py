@@ -1,4 +1,4 @@
-"""When frames are shown, and how many steps lie between."""
+"""The timeline: times of frames, and the number of solver steps between them."""
 
 from __future__ import annotations
 
@@ -6,35 +6,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-STEPS_PER_SECOND = 96
-"""Steps a second when `substeps` is not given: a step of 1/96 s keeps the splitting error small."""
-
-KEYFRAME_STEPS = 48
-"""Least steps a second of a scene with keyframes that does not say how many a frame has."""
-
-FPS = 24.0
-"""Frames a second of a `Timeline`, and of `animate`, that name none: the cinema's."""
-
-SCENE_FPS = 15.0
-"""The same of scenes and command lines, which mostly write a GIF: its size grows with every frame."""
-
-LEAST_FPS, FPS_LIMIT = 0.01, 1000.0
-"""Frame rates that make sense."""
+from wfluid.domain.limits import FPS, FPS_LIMIT, LEAST_FPS, STEPS_PER_SECOND
 
 FRAME_LIMIT = 100_000
-"""Most frames of one animation."""
-
-SUBSTEPS_LIMIT = 100_000
-"""Most steps a frame that a scene may ask for."""
+"""Largest number of frames of an animation."""
 
 MOST_FACTOR = 8
-"""Times the least steps that may be taken so that a time falls on one."""
+"""Largest factor by which `substeps_for` raises the number of steps per frame."""
 
 
 def substeps_for(times: Sequence[float], fps: float, least: float) -> int:
-    """The fewest steps a frame, `least` a second or more, with which every time falls on a step.
+    """The smallest number of steps per frame for which every one of `times` [s] is the end of a step.
 
-    Where 8 times as many do not do it either, the fewest there are.
+    At least `least` steps per second are taken. If no number up to 8 times the smallest suits, it is the
+    smallest.
     """
     fewest = math.ceil(least / fps - 1e-9)
     for substeps in range(fewest, MOST_FACTOR * fewest + 1):
@@ -46,14 +31,19 @@ def substeps_for(times: Sequence[float], fps: float, least: float) -> int:
 
 @dataclass(frozen=True)
 class Timeline:
-    """Frames at n / fps for n = 0 … round(duration fps), each `substeps` steps after the one before."""
+    """Frames at times n / fps for n = 0 … round(duration fps), with `substeps` solver steps between two.
+
+    Raises:
+        ValueError: a duration or rate that is not positive and finite, a rate outside 0.01 … 1000, more than
+            100 000 frames, substeps that are no integer from 1 on, or steps longer than 10 s.
+    """
 
     duration: float
-    """Length [s], positive."""
+    """Duration [s], above 0."""
     fps: float = FPS
-    """Frames a second."""
+    """Frame rate [1/s]."""
     substeps: int | None = None
-    """Steps a frame; by default so many that a step is no longer than 1/96 s."""
+    """Steps per frame; by default the smallest number for which a step is at most 1/96 s."""
 
     def __post_init__(self) -> None:
         for name in ("duration", "fps"):
@@ -74,22 +64,22 @@ class Timeline:
 
     @property
     def frames(self) -> int:
-        """Frames shown, both ends included."""
+        """Number of frames, first and last included."""
         return max(1, round(self.duration * self.fps)) + 1
 
     @property
     def steps_per_frame(self) -> int:
-        """Steps between two frames."""
+        """Number of steps between two frames."""
         return self.substeps or math.ceil(STEPS_PER_SECOND / self.fps)
 
     @property
     def steps(self) -> int:
-        """Steps to the last frame."""
+        """Number of steps to the last frame."""
         return (self.frames - 1) * self.steps_per_frame
 
     @property
     def end(self) -> float:
-        """When the last frame is shown [s]."""
+        """Time of the last frame [s]."""
         return self.time_of(self.steps)
 
     @property
@@ -98,11 +88,9 @@ class Timeline:
         return self.time_of(1)
 
     def time_of(self, step: int) -> float:
-        """When a step begins [s]: the same number as the end of the one before."""
+        """Start of a step [s], bit-equal to the end of the step before."""
         return step / (self.fps * self.steps_per_frame)
 
 
 STEP_LIMIT = 10.0
-"""Longest step the solver is tested with [s]."""
-
-LOOPS = ("oscillate", "pingpong", "crossfade")
+"""Largest step that the solver is tested with [s]."""

@@ -1,48 +1,50 @@
-"""Wall conditions, and the ghost values that follow from them."""
+"""Boundary conditions at the walls, and the rules for ghost values that follow from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
+from wfluid.domain.limits import WALLS
+
 
 class Wall(Enum):
-    """What the two edges of an axis do to the fluid."""
+    """Boundary condition at both edges of an axis."""
 
-    FREE_SLIP = "free-slip"
-    """Nothing flows through; the fluid slides along."""
-    NO_SLIP = "no-slip"
-    """Nothing flows through and the border stays where it is."""
-    PERIODIC = "periodic"
-    """What leaves on one side comes in on the other: for tileable pictures."""
+    FREE_SLIP = WALLS[0]
+    """No flow through the wall; the fluid slides along it without friction."""
+    NO_SLIP = WALLS[1]
+    """No velocity at the wall, so that the border of the picture stays in place."""
+    PERIODIC = WALLS[2]
+    """The two edges are joined, for tileable pictures."""
 
 
 class Rule(Enum):
-    """How a field continues beyond the edges of one axis."""
+    """Continuation of a field beyond the edges of an axis, which gives its ghost values."""
 
     EVEN = "even"
-    """Points half a cell inside; zero slope at the wall."""
+    """Even reflection of points half a cell inside: zero slope at the wall."""
     ODD = "odd"
-    """Points half a cell inside; zero value at the wall."""
+    """Odd reflection of points half a cell inside: zero value at the wall."""
     FACE = "face"
-    """Points on the wall, where the value is zero; odd beyond."""
+    """Odd reflection of points on the wall, where the value is zero."""
     PERIODIC = "periodic"
-    """The field of the other side."""
+    """The values of the opposite side."""
 
 
 @dataclass(frozen=True)
 class Walls:
-    """The wall condition of each axis: `x` for the left and right edge, `y` for top and bottom."""
+    """The boundary condition of each axis: `x` for the left and right edge, `y` for top and bottom."""
 
     x: Wall = Wall.FREE_SLIP
     y: Wall = Wall.FREE_SLIP
 
     @classmethod
     def parse(cls, text: str | Walls) -> Walls:
-        """Read "free-slip", or one word for each axis: "periodic,no-slip".
+        """The walls from one condition for both axes, "free-slip", or one for each, "periodic,no-slip".
 
         Raises:
-            ValueError: a word that is no wall condition, or more than two words.
+            ValueError: an unknown condition, or more than two.
         """
         if isinstance(text, Walls):
             return text
@@ -54,27 +56,27 @@ class Walls:
 
     @property
     def periodic(self) -> tuple[bool, bool]:
-        """Whether x, and y, wrap."""
+        """Whether the x axis, and the y axis, is periodic."""
         return self.x is Wall.PERIODIC, self.y is Wall.PERIODIC
 
     def centre_rules(self) -> tuple[Rule, Rule]:
-        """Of a scalar at cell centres along x and y: no flux through a wall."""
+        """Rules along x and y for a scalar at centres: no flux through a wall."""
         return _scalar(self.x), _scalar(self.y)
 
     def u_rules(self) -> tuple[Rule, Rule]:
-        """Of the velocity's x component, on x-faces."""
+        """Rules along x and y for the x component of the velocity, on x-faces."""
         return _normal(self.x, Rule.FACE), _tangential(self.y)
 
     def v_rules(self) -> tuple[Rule, Rule]:
-        """Of the velocity's y component, on y-faces."""
+        """Rules along x and y for the y component of the velocity, on y-faces."""
         return _tangential(self.x), _normal(self.y, Rule.FACE)
 
     def displacement_x_rules(self) -> tuple[Rule, Rule]:
-        """Of a displacement's x component at centres: it moves along walls as the velocity does."""
+        """Rules along x and y for the x component of a displacement, at centres: as for the velocity."""
         return _normal(self.x, Rule.ODD), _tangential(self.y)
 
     def displacement_y_rules(self) -> tuple[Rule, Rule]:
-        """Of a displacement's y component at centres."""
+        """Rules along x and y for the y component of a displacement, at centres: as for the velocity."""
         return _tangential(self.x), _normal(self.y, Rule.ODD)
 
 

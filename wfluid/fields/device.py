@@ -1,4 +1,4 @@
-"""The compute device: chosen once, opened quietly, kernels compiled with the time they took."""
+"""The compute device: opens it, and loads its kernels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from wfluid.system.stderr import quiet_stderr
 
 
 class DeviceError(ValueError):
-    """A device that this machine does not have."""
+    """The machine has no such device."""
 
 
 def open_device(name: str | None = None) -> wp.Device:
     """The device called `name`: "cpu", "cuda", "cuda:1", …; the CPU by default.
 
     Raises:
-        DeviceError: no such device here; the message lists what there is.
+        DeviceError: the machine has no such device; the message lists its devices.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
     with quiet_stderr():
@@ -28,19 +28,20 @@ def open_device(name: str | None = None) -> wp.Device:
     try:
         return wp.get_device(name or "cpu")
     except (ValueError, RuntimeError) as error:
-        there = ", ".join(device.alias for device in wp.get_devices())
-        raise DeviceError(f"device {name!r} is not available here; there is: {there}") from error
+        aliases = ", ".join(device.alias for device in wp.get_devices())
+        raise DeviceError(f"device {name!r} is not available here; there is: {aliases}") from error
 
 
 def kernels_are_built(device: wp.Device) -> bool:
-    """Whether Warp's cache holds the kernels for `device`, so that loading them takes no compiler."""
+    """Whether the cache of Warp holds the kernels for `device`, so that loading them does not compile."""
     module = module_of(_kind(device))
-    return (Path(wp.config.kernel_cache_dir) / module.get_module_identifier(_threads(device))).is_dir()
+    return (Path(str(wp.config.kernel_cache_dir)) / module.get_module_identifier(_threads(device))).is_dir()
 
 
 @exclusive
 def load_kernels(device: wp.Device, module: str = FORWARD) -> float:
-    """Load every kernel of a module for `device`, compiling them first if need be; the seconds it took.
+    """Load the kernels of a module for `device`, compiled if the cache lacks them; returns the time taken
+    [s].
 
     Raises:
         RuntimeError: the kernels do not compile for this device.
@@ -56,5 +57,5 @@ def _kind(device: wp.Device) -> str:
 
 
 def _threads(device: wp.Device) -> int:
-    """Threads a block, as `wp.launch` takes them: part of what a module is compiled for."""
+    """Threads per block, as in `wp.launch`; modules are compiled for it."""
     return 256 if device.is_cuda else 1

@@ -1,4 +1,4 @@
-"""Ghost values on the device: filled by a wall's rule, and folded back by its transpose."""
+"""Ghosts on the device: filled by the boundary rules, and the transpose of filling."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from wfluid.kernels.step import ghosts
 
 
 def ghost_table(n: int, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
-    """Source index 0 … n-1 and sign of each padded position -2 … n+1 of an axis of n cells."""
+    """Source index 0 … n - 1 and sign of positions -2 … n + 1 of an axis of n cells: two arrays (n + 4,)."""
     i = np.arange(-HALO, n + HALO)
     if rule is Rule.PERIODIC:
         return i % n, np.ones(len(i))
-    if rule is Rule.FACE:  # reflect about the points 0 and n, where the value is zero
+    if rule is Rule.FACE:  # odd reflection about the points 0 and n, where the value is 0
         folded = i % (2 * n)
         source = np.where(folded <= n, folded, 2 * n - folded)
         sign = np.where(folded % n == 0, 0.0, np.where(folded < n, 1.0, -1.0))
@@ -29,7 +29,7 @@ def ghost_table(n: int, rule: Rule) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Ghosts:
-    """Fills the ghosts of fields of one layout under one rule per axis."""
+    """Fills the ghosts of fields of one layout, with one boundary rule per axis."""
 
     def __init__(self, layout: Layout, rules: tuple[Rule, Rule], device: wp.Device):
         self.layout = layout
@@ -43,7 +43,7 @@ class Ghosts:
             ]
 
     def fill(self, f: wp.array) -> None:
-        """Give the ghosts of f, and its faces on a wall, their values, in place."""
+        """Set the ghosts of f, and its faces on a wall, in place."""
         layout = self.layout
         ghosts.fill.launch(
             layout.ny + layout.nx + 2 * HALO,
@@ -53,9 +53,9 @@ class Ghosts:
         )
 
     def fold(self, f_bar: wp.array) -> None:
-        """The transpose of `fill`: gradients with respect to ghosts go to what they are copies of, in place.
+        """The transpose of `fill`, in place: the gradient of a ghost is added to that of its source.
 
-        The ghosts, and the faces on a wall, come out as 0.
+        The gradients of ghosts, and of faces on a wall, are then set to 0.
         """
         layout, (columns, rows) = self.layout, (self._tables[:2], self._tables[2:])
         inputs = [*rows, layout.ny, layout.pitch]

@@ -14,42 +14,50 @@ from wfluid.kernels.cell.strips import GIVEN_UP, STRIP, Strip
 from wfluid.system.threads import ThreadTeam
 
 _PATIENCE = 10.0
-"""How long an interrupted replay waits for its helpers to end [s]."""
+"""Longest time that an interrupted replay waits for its helper threads to end [s]."""
 
 
 class CapturedGraph:
-    """The launches of `work`, captured once, replayed by several threads that share their rows.
+    """The launches of `work`, captured once, replayed by one thread or by several that share the rows.
 
-    The calling thread is one of them, `pool`, which must have no other work, has the others.
+    The calling thread replays the first strip, the threads of `pool` the others; the pool must have no other
+    work. Without a pool the calling thread replays everything.
     """
 
     def __init__(self, device: wp.Device, work: Callable[[], None], pool: ThreadTeam | None):
         self._pool = pool
-        self._strips = strips(pool.count + 1, device) if pool else [None]
-        self._graphs = [_captured(device, work, strip) for strip in self._strips]
+        self._strips = strips(pool.count + 1, device) if pool else []
+        self._graphs = [_captured(device, work, strip) for strip in self._strips or [None]]
 
     def launch(self) -> None:
-        """Run it."""
+        """Replay the graph, and return when all threads have replayed their part."""
+        if self._pool is None:
+            wp.capture_launch(self._graphs[0])
+        else:
+            self._launch_together(self._pool)
+
+    def _launch_together(self, pool: ThreadTeam) -> None:
         try:
-            others = [self._pool.submit(wp.capture_launch, graph) for graph in self._graphs[1:]]
+            others = [pool.submit(wp.capture_launch, graph) for graph in self._graphs[1:]]
             wp.capture_launch(self._graphs[0])
             for other in others:
                 other.result()
-        except BaseException:  # interrupted: whoever waits for this thread must not do so for ever
-            if self._pool:
-                self._give_up()
+        except (
+            BaseException
+        ):  # interrupted: threads that wait at a barrier for this one must not wait for ever
+            self._give_up(pool)
             raise
 
-    def _give_up(self) -> None:
-        """Let strips that wait go on to their end, whatever they compute; then forget the meetings."""
+    def _give_up(self, pool: ThreadTeam) -> None:
+        """Open all barriers, so that waiting strips run to their end, with wrong results; then reset them."""
         counter = read(self._strips[0].counter)
         counter[GIVEN_UP] = 1
-        idle = threading.Barrier(len(self._graphs))  # reached when every helper has done what it had
+        idle = threading.Barrier(len(self._graphs))  # passed when every helper thread has ended its work
         for _ in self._graphs[1:]:
-            self._pool.submit(idle.wait)
+            pool.submit(idle.wait)
         try:
             idle.wait(_PATIENCE)
-        finally:  # whoever came late, or is interrupted again
+        finally:  # also where a helper thread was too late, or this thread is interrupted again
             idle.abort()
             counter[:] = 0
 

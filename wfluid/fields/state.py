@@ -1,4 +1,4 @@
-"""The fluid at one time: arrays only."""
+"""The state of the fluid at one time: arrays only."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from wfluid.fields.arrays import clone, copy, field, fill, finite, read, to_nump
 from wfluid.kernels.cell.layout import Layout
 
 FIELDS = ("u", "v", "d_x", "d_y", "q")
-"""Arrays of a state over the grid, beside its densities."""
+"""Names of the arrays over the grid, without densities."""
 
 PARTICLES = ("p_x", "p_y")
-"""Arrays of a state with an entry a point."""
+"""Names of the arrays with one entry per point of the picture."""
 
 
 @dataclass(frozen=True)
 class State:
-    """A fluid over one `Layout`, with ghosts: velocity, displacement, pressure, densities; and points."""
+    """Velocity, displacement, pressure and densities over one `Layout`, with ghosts; and points."""
 
     grid: Grid
-    """The grid the arrays are on."""
+    """The grid of the arrays."""
     u: wp.array
     """Velocity along x on x-faces [longer side/s], face i of row j at (i hx, (j + 1/2) hy)."""
     v: wp.array
@@ -34,18 +34,20 @@ class State:
     d_y: wp.array
     """Displacement (source - y) along y at centres [cells of hy]."""
     q: wp.array
-    """Impulse of the pressure in the last step, at centres [longer side^2/s], the next step's first guess;
-    0 where diffusion needs none."""
+    """Impulse of the pressure in the last step, at centres [longer side^2/s]: the initial guess of the next
+    step.
+
+    0 where the fluid does not use it."""
     rho: tuple[wp.array, ...]
-    """The fluid's densities at centres, in their order; of no unit."""
+    """The densities of the fluid at centres, in their order, without unit."""
     p_x: wp.array
-    """Where points of the picture are now, along x [cells from the left edge]; one number a point."""
+    """Positions of points of the picture along x [cells from the left edge], one entry per point."""
     p_y: wp.array
-    """The same along y [cells from the top edge]."""
+    """Positions of points of the picture along y [cells from the top edge], one entry per point."""
 
     @classmethod
     def at_rest(cls, grid: Grid, device: wp.Device, densities: int = 0, points: int = 0) -> State:
-        """A still fluid under an untouched picture, without densities; all points at the origin."""
+        """A fluid at rest: velocity, displacement, pressure and densities are 0, all points at the origin."""
         layout = Layout(grid.nx, grid.ny)
         fields = {name: field(layout, device) for name in FIELDS}
         particles = {name: zeros(points, device) for name in PARTICLES}
@@ -53,60 +55,60 @@ class State:
 
     @property
     def fields(self) -> list[wp.array]:
-        """Every array over the grid."""
+        """All arrays over the grid."""
         return [*(getattr(self, name) for name in FIELDS), *self.rho]
 
     @property
     def particles(self) -> list[wp.array]:
-        """Where points are along x and y."""
+        """Positions of the points along x and y."""
         return [getattr(self, name) for name in PARTICLES]
 
     @property
     def arrays(self) -> list[wp.array]:
-        """Every array that has entries."""
+        """All arrays that have entries."""
         return [a for a in (*self.fields, *self.particles) if a.size]
 
     @property
     def seen(self) -> list[wp.array]:
-        """What is seen of it: the map, the points, the densities."""
+        """Arrays that objectives and pictures read: displacement, points, densities."""
         return [self.d_x, self.d_y, *self.particles, *self.rho]
 
     def view(self) -> State:
-        """The same memory in arrays of its own, which may have other gradients."""
+        """A state over the same memory, whose arrays may have other gradients."""
         return self._with_each(view)
 
     def copy(self) -> State:
-        """The same values in arrays of their own."""
+        """A state with the same values in new arrays."""
         return self._with_each(clone)
 
     def _with_each(self, change: Callable[[wp.array], wp.array]) -> State:
-        """A state whose arrays are made of this one's, each by itself."""
+        """A state with `change` applied to each array."""
         arrays = {name: change(getattr(self, name)) for name in (*FIELDS, *PARTICLES)}
         return State(self.grid, rho=tuple(change(rho) for rho in self.rho), **arrays)
 
     def copy_into(self, other: State) -> None:
-        """Write its values into another state of the same grid, densities and points."""
+        """Write the values into another state with the same grid, densities and points."""
         for a, b in zip(self.arrays, other.arrays, strict=True):
             copy(a, b)
 
     def zero_(self) -> None:
-        """Write 0 into every array, in place."""
+        """Set all arrays to 0, in place."""
         fill(0.0, *self.arrays)
 
     @property
     def finite(self) -> bool:
-        """Whether every number of it is finite."""
+        """Whether all values are finite."""
         return finite(self.arrays)
 
     def take_gradient(self, bar: State) -> None:
-        """Let the arrays of `bar` hold the gradients."""
+        """Make the arrays of `bar` the gradients of these arrays."""
         pairs = zip((*self.fields, *self.particles), (*bar.fields, *bar.particles), strict=True)
         for a, b in pairs:
             a.grad = b
 
     @property
     def layout(self) -> Layout:
-        """Where the cells lie in the arrays."""
+        """Layout of the cells in the arrays."""
         return Layout(self.grid.nx, self.grid.ny)
 
     @property
@@ -127,6 +129,6 @@ class State:
 
     @property
     def points(self) -> np.ndarray:
-        """Where the points are now [longer side]: (points, 2), x and y, a copy."""
+        """Positions of the points [longer side]: (points, 2), x and y, a copy."""
         columns = [read(p).astype(np.float64) for p in self.particles]
         return np.stack(columns, axis=1) * (self.grid.hx, self.grid.hy)

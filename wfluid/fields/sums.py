@@ -14,10 +14,9 @@ from wfluid.kernels.solve import sums
 
 
 class InnerProduct:
-    """Sums over the cells of fields of one layout, of vectors with up to so many `components`.
+    """Sums over the cells of fields of one layout, for vectors of at most `components` components.
 
-    Each is summed along rows first, into an array of its own: what one call leaves there, another of the same
-    object writes over.
+    Rows are summed first, into an array that belongs to the object: each call overwrites the last one's sums.
     """
 
     def __init__(self, layout: Layout, device: wp.Device, components: int = 1):
@@ -46,20 +45,20 @@ class InnerProduct:
         sums.mean_of.launch(1, self.device, [self._rows, ny, nx * ny], [out])
 
     def total(self) -> float:
-        """The sum that `along_rows` found, in double precision."""
+        """The sum over the rows of the last `along_rows`, in double precision."""
         return float(read(self._rows).sum(dtype=np.float64))
 
     def norm(self, x: Vector) -> float:
-        """Euclidean norm of x."""
+        """Euclidean norm of x over all cells and components."""
         return float(np.sqrt(sum(self._squares(f).sum(dtype=np.float64) for f in x)))
 
     def largest(self, f: wp.array) -> float:
-        """Largest absolute value of f."""
+        """Largest absolute value of f over the cells."""
         self._squares(f)
         return float(read(self._largest).max())
 
     def _squares(self, f: wp.array) -> np.ndarray:
-        """The sum of the squares of f over each row; leaves the largest absolute values in `_largest`."""
+        """The sum of the squares of f over each row; writes the largest absolute values to `_largest`."""
         layout = self.layout
         inputs = [f, layout.nx, layout.pitch]
         sums.row_norms.launch(layout.ny, self.device, inputs, [self._rows, self._largest])

@@ -12,19 +12,19 @@ from wfluid.pictures.picture import Picture, display_rgb
 from wfluid.system.atomic import atomic_file
 
 LONGEST_DELAY = 65535
-"""Longest GIF delay that its two bytes hold [1/100 s]."""
+"""Longest delay of a GIF, limited by two bytes [1/100 s]."""
 
 LEAST_DELAY = 2
-"""Shortest GIF delay that browsers obey [1/100 s]."""
+"""Shortest delay of a GIF that browsers respect [1/100 s]."""
 
 
 class GifWriter:
-    """An animated GIF that loops for ever, written with PyAV where that is installed, else with OpenImageIO.
+    """A writer of endless GIFs, which uses PyAV if it is installed, otherwise OpenImageIO.
 
-    Delays are whole hundredths of a second: they vary by one, so that their mean is 1 / fps.
+    Delays are integers in units of 1/100 s. They vary by one unit, so that their mean is 1 / fps.
 
     Raises:
-        PictureError: a frame rate that no delay gives.
+        PictureError: a frame rate beyond the limits of delays.
     """
 
     def __init__(self, path: Path, fps: float):
@@ -36,7 +36,7 @@ class GifWriter:
         self._frames: list[np.ndarray] = []
 
     def write(self, picture: Picture) -> None:
-        """Keep the frame: one palette is made for all of them."""
+        """Keep the frame until `close`, because the palette is common to all frames."""
         self._frames.append(display_rgb(picture))
 
     def close(self) -> None:
@@ -52,13 +52,13 @@ class GifWriter:
         self.written.append(self.path)
 
     def abandon(self) -> None:
-        """Nothing is written before `close`."""
+        """Do nothing: no file exists before `close`."""
 
 
 def _write_gif(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> None:
-    """Write 8-bit RGB frames as a GIF with OpenImageIO: a palette for each frame, one delay for all.
+    """Write 8-bit RGB frames as a GIF with OpenImageIO, with a palette for each frame.
 
-    The delays are therefore written into the finished file.
+    OpenImageIO gives all frames one delay, so that the delays are corrected in the finished file.
     """
     import OpenImageIO as oiio
 
@@ -78,7 +78,7 @@ def _write_gif(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> N
 
 
 def delays(frames: int, fps: float) -> list[int]:
-    """Delay of each frame [1/100 s]: whole, 2 or more, their sum the rounded length of the animation."""
+    """Delays of all frames [1/100 s], integers from 2 on whose sum is the rounded duration."""
     edges = np.floor(np.arange(frames + 1) * (100.0 / fps) + 0.5 + 1e-9).astype(int)
     return [max(LEAST_DELAY, int(delay)) for delay in np.diff(edges)]
 

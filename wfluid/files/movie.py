@@ -35,9 +35,9 @@ def available() -> bool:
 
 
 class MovieWriter:
-    """An MP4 or WebM, encoded while the frames come: 8-bit BT.709, 4:2:0.
+    """A writer of MP4 or WebM that encodes each frame as it comes: 8-bit BT.709, 4:2:0.
 
-    That needs an even width and height: an odd last row or column is doubled.
+    The format requires an even width and height: an odd last row or column is repeated.
     """
 
     def __init__(self, path: Path, fps: float):
@@ -92,10 +92,7 @@ class MovieWriter:
 
 
 def write_gif(path: Path, frames: Sequence[np.ndarray], delays: Sequence[int]) -> None:
-    """Write 8-bit RGB frames as a GIF with one palette for all, looping for ever.
-
-    Each frame is shown for its delay [1/100 s].
-    """
+    """Write 8-bit RGB frames as an endless GIF with one palette and a delay for each frame [1/100 s]."""
     import av
 
     height, width, _ = frames[0].shape

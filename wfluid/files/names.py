@@ -10,7 +10,7 @@ from wfluid.pictures.formats import PictureError
 
 
 def check_folder(path: Path) -> None:
-    """Refuse a path at which no file can be written; nothing on the disk changes.
+    """Check that a file can be written at a path, without writing one.
 
     Raises:
         PictureError: a folder that does not exist or cannot be written, or a path that is a folder.
@@ -24,7 +24,7 @@ def check_folder(path: Path) -> None:
 
 
 def files_written(path: Path, start: int, frames: int) -> set[Path]:
-    """Every file that an animation of so many frames writes under a name, resolved."""
+    """Resolved paths of all files that an animation with a number of frames writes to a path."""
     pattern = numbering(path)
     if pattern is None:
         return {path.resolve()}

@@ -24,11 +24,11 @@ class FrameWriter(Protocol):
     """Finished files."""
 
     def write(self, picture: Picture) -> None:
-        """Take the next frame."""
+        """Write the next frame, or keep it until `close`."""
         ...
 
     def close(self) -> None:
-        """Finish the file, where one holds all frames."""
+        """Finish a file that contains all frames."""
         ...
 
     def abandon(self) -> None:
@@ -41,11 +41,11 @@ def open_output(
 ) -> FrameWriter:
     """The writer for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
 
-    `start` is the number of a sequence's first frame, `encoding` how its stills are written.
+    `start` is the number of the first frame of a sequence, `encoding` the encoding of its stills.
 
     Raises:
-        PictureError: a name that is none of these, a folder that does not exist or cannot be written, a
-            movie without the extra `video`, or an encoding that the format does not have.
+        PictureError: an unknown kind of name, a folder that does not exist or cannot be written, a movie
+            without the extra `video`, or an encoding that the format does not support.
     """
     path, encoding = Path(path), encoding or Encoding()
     check_folder(path)

@@ -30,7 +30,7 @@ class PointRow:
     target: tuple[float, float]
     """Its destination, x and y [px]."""
     time: float | None
-    """Time of arrival [s], after 0; None where the file has none."""
+    """Time of arrival [s], after 0; None if the row has none."""
 
 
 def read_points(path: str | os.PathLike) -> list[PointRow]:
@@ -40,7 +40,7 @@ def read_points(path: str | os.PathLike) -> list[PointRow]:
     that begin with # are skipped. Points are not compared with the size of a picture.
 
     Raises:
-        FileError: a file that is missing, no text or has no points; or an invalid line, with its number.
+        FileError: a file that is missing, is no text or has no points; or an invalid line, with its number.
     """
     path, found = Path(path), []
     names: Sequence[str] | None = None
@@ -78,7 +78,7 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _separator_of(line: str) -> str:
-    """The separator of a line's fields: the one that gives 4 or 5 fields, else the one that gives most."""
+    """The separator of a line's fields: the one with 4 or 5 fields, else the one with most fields."""
     counts = {separator: len(_split(line, separator)) for separator in _SEPARATORS}
     return next((one for one in counts if counts[one] in (4, 5)), max(counts, key=counts.get))
 

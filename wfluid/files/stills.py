@@ -11,7 +11,7 @@ from wfluid.pictures.stills import write_picture
 
 
 class StillsWriter:
-    """A still for each frame; `pattern` in the name stands for its number, the first of which is `start`."""
+    """A writer of a still for each frame; `pattern` in the name stands for its number, from `start` on."""
 
     def __init__(self, path: Path, pattern: str, start: int, encoding: Encoding):
         self.path, self.pattern, self.next, self.encoding = path, pattern, start, encoding
@@ -25,7 +25,7 @@ class StillsWriter:
         self.next += 1
 
     def close(self) -> None:
-        """Every still is finished already."""
+        """Do nothing: every still is complete."""
 
     def abandon(self) -> None:
-        """Stills that are finished stay."""
+        """Do nothing: complete stills are kept."""

@@ -12,9 +12,9 @@ from wfluid.system.errors import FileError
 
 
 class TrackWriter:
-    """A CSV file with a row a frame and point: frame, time [s], point (from 0), x, y [px].
+    """A writer of a CSV file with a row per frame and point: frame, time [s], point (from 0), x, y [px].
 
-    Pixels are those of a frame whose longer side is `side`.
+    `side` is the longer side of the frames [px].
 
     Raises:
         FileError: a name that does not end in .csv.
@@ -29,7 +29,7 @@ class TrackWriter:
         self._frames = 0
 
     def write(self, time: float, points: Sequence[tuple[float, float]] | np.ndarray) -> None:
-        """Add the next frame's points [longer side]."""
+        """Add the points of the next frame, (n, 2) [longer side]."""
         for n, (x, y) in enumerate(points):
             self._rows.append(f"{self._frames},{time:.6g},{n},{x * self._side:.4f},{y * self._side:.4f}")
         self._frames += 1
@@ -41,4 +41,4 @@ class TrackWriter:
             self.written.append(self.path)
 
     def abandon(self) -> None:
-        """Nothing is written before `close`."""
+        """Do nothing: no file exists before `close`."""

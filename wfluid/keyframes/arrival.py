@@ -25,7 +25,7 @@ class Arrival:
     keyframe: ParticleKeyframe
     """Its destination and time."""
     pinned: bool
-    """Whether the point should stay in its place all the time."""
+    """Whether the point is pinned: it should stay in place until the last keyframe."""
     particle: Place
     """Position of the point carried by the flow [longer side]."""
     source: Place
@@ -50,7 +50,7 @@ class Arrival:
 
 
 def _cell(place: np.ndarray, grid: Grid) -> tuple[int, int]:
-    """Row and column of the cell that a place is in."""
+    """Row and column of the cell that contains a place."""
     x, y = place / (grid.hx, grid.hy)
     return min(int(y), grid.ny - 1), min(int(x), grid.nx - 1)
 

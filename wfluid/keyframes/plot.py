@@ -1,8 +1,7 @@
-"""A figure of a match: the arrows on the picture, the grid that they deform, the way down.
+"""A figure of a match: arrows over the picture, the deformed grid, and the progress of the search.
 
-`plot_match(match, "match.png")` writes the figure of what `match_keyframes` found.
-
-The first panel is figure 3 of the paper (Bonilla & Velho): where points were, should be and came.
+`plot_match(match, "match.png")` writes the figure of a result of `match_keyframes`. The first panel follows
+Bonilla & Velho, figure 3: sources, targets and final positions of points.
 """
 
 from __future__ import annotations
@@ -34,10 +33,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ENDINGS = (".png", ".pdf", ".svg")
-"""Kinds of figures, by the ends of their names."""
+"""File formats of figures, by the ending of the name."""
 
 LINES = 24
-"""Lines of the grid along the longer side."""
+"""Number of grid lines along the longer side."""
 
 _DPI = 140
 _SHOWN = 1200  # longest side of a picture in a figure [px]: more than a panel has
@@ -69,11 +68,11 @@ _UNDATED = {".png": {}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
 
 def check_plot(path: str | os.PathLike) -> Path:
-    """The path of a figure that can be written there: worth asking before a long search.
+    """Check before a long search that a figure can be written to a path; returns the path.
 
     Raises:
         ValueError: matplotlib is not installed.
-        FileError: an ending that is no figure's, or a folder that is not there or cannot be written.
+        FileError: an unknown ending, or a folder that does not exist or cannot be written.
     """
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:
@@ -91,13 +90,13 @@ def check_plot(path: str | os.PathLike) -> Path:
 def plot_match(match: Match, path: str | os.PathLike) -> None:
     """Write a figure of a match as PNG, PDF or SVG, completely or not at all.
 
-    Beside one another: the untouched picture with its points, arrows, trajectories and pins; the picture
-    at the end of the animation, which is run for it, under a grid that was regular; and how the search
-    went. Lengths are in pixels of the animation's picture.
+    The panels show the untouched picture with points, arrows, trajectories and pins; the last frame, for
+    which the animation is run, with the deformed grid; and the progress of the search. Lengths are in pixels
+    of the animation's picture.
 
     Raises:
         ValueError: matplotlib is not installed.
-        FileError: an ending that is no figure's, or the file cannot be written.
+        FileError: an unknown ending, or a file that cannot be written.
     """
     path = check_plot(path)
     ending = path.suffix.lower()
@@ -131,7 +130,7 @@ def figure_of(match: Match) -> Figure:
 
 @contextmanager
 def _styled() -> Iterator[None]:
-    """matplotlib's defaults and `_STYLE`, whatever the user's settings are."""
+    """Use matplotlib's defaults and `_STYLE` instead of the user's settings."""
     from matplotlib import style
 
     with style.context(_STYLE, after_reset=True):
@@ -139,7 +138,7 @@ def _styled() -> Iterator[None]:
 
 
 def _panel(picture: Picture) -> tuple[float, float]:
-    """Width and height of a panel with the picture [inch]; very long ones leave some of it free."""
+    """Width and height of a panel with the picture [inch]; a very long picture does not fill its panel."""
     aspect = picture.width / picture.height
     height = max(_PANEL / max(aspect, 1.0), _LOWEST)
     return max(min(height * aspect, _PANEL), _NARROWEST), height
@@ -151,7 +150,7 @@ def _side(match: Match) -> int:
 
 
 def _small(picture: Picture) -> tuple[int, int]:
-    """Width and height that a picture is shown with [px]."""
+    """Width and height at which a picture is drawn [px]."""
     factor = min(1.0, _SHOWN / max(picture.width, picture.height))
     return max(1, round(factor * picture.width)), max(1, round(factor * picture.height))
 
@@ -163,7 +162,7 @@ def _last_frame(animation: Animation) -> Frame:
 
 
 def _show(axes: Axes, shown: Picture, extent: tuple[int, int], light: float) -> None:
-    """A picture as it is seen, its axes in the pixels of `extent`; `light` is how much white is on it."""
+    """Draw a picture on axes in the pixels of `extent`, covered by white of opacity `light`."""
     width, height = extent
     colours, _ = encode(shown.shrunk(*_small(shown)), "uint8", linear=False, channels=3)
     colours = np.broadcast_to(colours, (*colours.shape[:2], 3)) / 255
@@ -174,7 +173,7 @@ def _show(axes: Axes, shown: Picture, extent: tuple[int, int], light: float) -> 
 
 
 def _draw_points(axes: Axes, match: Match) -> None:
-    """Sources, arrows from keyframe to keyframe, where points came, and how."""
+    """Draw points, arrows from keyframe to keyframe, trajectories, and positions reached."""
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import withStroke
 
@@ -250,14 +249,14 @@ def _draw_points(axes: Axes, match: Match) -> None:
 
 
 def _legs(moved: Sequence[Sequence[Arrival]]) -> Iterator[tuple[Place, Place]]:
-    """From each point to its first keyframe, and from each to the next."""
+    """Start and end of each arrow: from a point to its first keyframe, and from each to the next."""
     for own in moved:
         stops = [own[0].keyframe.point, *(arrival.keyframe.destination for arrival in own)]
         yield from (leg for leg in pairwise(stops) if leg[0] != leg[1])
 
 
 def _draw_grid(axes: Axes, match: Match, frame: Frame) -> None:
-    """The last frame under lines that were straight: contours of where its places come from."""
+    """Draw the last frame with the deformed grid: contour lines of the coordinates of the backward map."""
     picture, side = match.animation.picture, _side(match)
     _show(axes, frame.picture, (picture.width, picture.height), 0.25)
     least, greatest = match.jacobian
@@ -282,7 +281,7 @@ def _draw_grid(axes: Axes, match: Match, frame: Frame) -> None:
 
 
 def _draw_history(axes: Axes, match: Match) -> None:
-    """The longest misfit and what was minimised, by iteration, over the stages' tints."""
+    """Draw the longest misfit and the objective by iteration, with the stages as tinted bands."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
     history, side = match.history, _side(match)
@@ -327,7 +326,7 @@ def _draw_history(axes: Axes, match: Match) -> None:
 
 
 def _decades(values: np.ndarray) -> tuple[float, float]:
-    """Limits of a log axis that has two powers of ten to name, whatever the values."""
+    """Limits of a logarithmic axis that contain at least two powers of ten."""
     known = values[np.isfinite(values)]
     least, greatest = (known.min(), known.max()) if len(known) else (1.0, 1.0)
     room = max(1.4, np.sqrt(100 * least / greatest))
@@ -340,7 +339,7 @@ def _title(axes: Axes, title: str, subtitle: str) -> None:
 
 
 def _legend(axes: Axes, handles: Sequence[Artist], below: float) -> None:
-    """A legend so far below a panel [inch]."""
+    """Draw a legend at a distance below a panel [inch]."""
     from matplotlib.transforms import ScaledTranslation
 
     axes.legend(

@@ -34,7 +34,8 @@ from wfluid.keyframes.ways import Way
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import GaussianForce
-from wfluid.optimize.lbfgs import Iterate, Settings, minimise
+from wfluid.optimize.lbfgs import Iterate, minimise
+from wfluid.optimize.settings import Settings
 
 MARCH, COARSE, FINE = "march", "coarse", "fine"
 """Stages of a search."""
@@ -64,7 +65,7 @@ NOISE = 1e-6
 """Relative noise of values computed in single precision."""
 
 MEMORY = 20
-"""Pairs that the optimiser keeps: cheap beside a run, and many for the few free numbers."""
+"""Number of pairs in the optimiser's memory: their cost is small beside that of a run."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ class TimeSpan:
     forces: Sequence[GaussianForce]
     """The forces to begin with, point by point, in the order of their windows."""
     windows: Sequence[int]
-    """Window of each force; -1 for forces that a march does not change."""
+    """Index of the window of each force; -1 for forces that a march does not change."""
     owners: Sequence[int]
     """Index of the point of each force."""
     guided: Sequence[bool]
@@ -128,13 +129,13 @@ class Problem:
     given: Sequence[Force]
     """The user's forces."""
     free: Sequence[Free]
-    """Numbers of the user's forces that may vary."""
+    """Parameters of the user's forces that may vary."""
     timeline: Timeline
     """The timeline of the animation."""
     device: str | None
     """Name of the device."""
     graphs: GraphCache
-    """Captured graphs, which one minimisation takes over from the one before."""
+    """Captured graphs, which each minimisation reuses from the previous one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +197,7 @@ class Search:
     def settle(
         self, stage: str, level: GridStart, corrections: Mapping[float, np.ndarray] = NOTHING
     ) -> float:
-        """Minimise over all windows; the longest misfit of a keyframe [longer side].
+        """Minimise over all windows; returns the longest misfit of a keyframe [longer side].
 
         After each minimisation the misfits are subtracted from the aims: the method of multipliers (Nocedal &
         Wright, 17.3). If that does not halve the longest misfit, the weight is lowered too. `corrections` are
@@ -218,10 +219,10 @@ class Search:
         return worst
 
     def after(self, level: GridStart, step: int | None = None) -> GridStart:
-        """The level at the end of the span, or at a step."""
+        """The fluid and the points at the end of the span, or at a step."""
         step = self._span.edges[-1] if step is None else step
-        journey = WayMisfit(self._span.ways, level.points, [self._time_of(step)], self._unit)
-        functional = self._functional(level, step, journey, self._all_free(), self._weight)
+        misfit = WayMisfit(self._span.ways, level.points, [self._time_of(step)], self._unit)
+        functional = self._functional(level, step, misfit, self._all_free(), self._weight)
         state = functional.state_after(functional.start)
         return GridStart(level.grid, (self._time_of(step), state), state.points)
 
@@ -242,7 +243,7 @@ class Search:
         return found
 
     def _functional(
-        self, level: GridStart, last: int, journey: WayMisfit, free: Sequence[Free], weight: float
+        self, level: GridStart, last: int, misfit: WayMisfit, free: Sequence[Free], weight: float
     ) -> Functional:
         scene, edges = self._scene, self._span.edges
         return Functional(
@@ -250,7 +251,7 @@ class Search:
             scene.fluid,
             (*self.given, *self.forces),
             scene.timeline,
-            journey + (weight / self._typical_effort) * Effort(),
+            misfit + (weight / self._typical_effort) * Effort(),
             free,
             begin=level.begin,
             end=self._time_of(last),
@@ -273,13 +274,13 @@ class Search:
         free: Sequence[Free],
         corrections: Mapping[float, np.ndarray] = NOTHING,
     ) -> tuple[float, Mapping[float, np.ndarray]]:
-        """Minimise over the free numbers, keep the best point; the longest and all keyframe misfits."""
+        """Minimise over the free parameters, keep the best point; returns the longest and all misfits."""
         log, span = self._log, self._span
         moments, marches = self._moments(*steps), stage == MARCH
         guided = span.guided if marches else ()
         multipliers, weight = (NOTHING, MARCH_WEIGHT) if marches else (self._multipliers, self._weight)
-        journey = WayMisfit(span.ways, level.points, moments, self._unit, guided, corrections, multipliers)
-        functional = self._functional(level, steps[1], journey, free, weight)
+        misfit = WayMisfit(span.ways, level.points, moments, self._unit, guided, corrections, multipliers)
+        functional = self._functional(level, steps[1], misfit, free, weight)
         smooth = Smoothness(self._chains(functional), weight)
         done, stopped = log.evaluations, False
 
@@ -288,7 +289,7 @@ class Search:
                 found = functional.evaluate(m)
             except ValueError as error:  # a force beyond the limit
                 raise FloatingPointError(str(error)) from error
-            return *smooth.added(found.value, found.gradient, m), journey.misfits(found.places)
+            return *smooth.added(found.value, found.gradient, m), misfit.misfits(found.places)
 
         def heed(at: Iterate) -> bool:
             nonlocal stopped

@@ -42,10 +42,11 @@ class WayMisfit(ParticleObjective):
         corrections: Mapping[float, np.ndarray] = NOTHING,
         multipliers: Mapping[float, np.ndarray] = NOTHING,
     ):
-        """`moments` are times of the run, those of keyframes among them; `guided` says who is led, if any.
+        """`moments` are the times at which misfits count [s], including those of keyframes.
 
-        `corrections` are added to the places of a time, (n, 2) [longer side]; `multipliers` move the aim
-        only: misfits are still measured from the place.
+        `guided` tells for each point whether its way counts between keyframes. `corrections` are added to the
+        targets at a time, (n, 2) [longer side]. `multipliers` move the aims of the minimisation only; misfits
+        are still measured from the targets.
         """
         self.points, self.times = points, tuple(moments)
         self._unit = unit

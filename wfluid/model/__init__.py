@@ -1,1 +1,1 @@
-"""What moves and resists, as descriptions: fluid, densities, forces."""
+"""The physical model as frozen descriptions: fluid, densities, forces."""

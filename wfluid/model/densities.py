@@ -1,4 +1,4 @@
-"""Densities that the fluid carries and spreads, such as ink and smoke (Bonilla & Velho, section II):
+"""Densities that the fluid transports and diffuses, such as ink and smoke (Bonilla & Velho, section II):
 
 d rho / dt = -(v . grad) rho + kappa Lap rho + S
 """
@@ -17,25 +17,25 @@ from wfluid.model.force import GaussianImpulse, check_radius, impulse_slopes, sh
 from wfluid.model.painted import Painted
 
 SOURCE_RATE_LIMIT = 1e6
-"""Most that a source may pour [1/s]."""
+"""Largest rate of a source [1/s]."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Pours density around a point: rate exp(-|x - center|^2 / 2 radius^2) times the envelope.
+    """A source of density around a point: rate exp(-|x - center|^2 / 2 radius^2) times the envelope.
 
     Raises:
-        ValueError: a value that is not finite, or a radius that is not positive.
+        ValueError: a value that is not finite, a rate beyond 1e6/s, or a radius outside 1e-6 … 1e3.
     """
 
     center: Center
-    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    """Center x, y [longer side], or a `Path` or a function of the time [s] if it moves."""
     rate: float
-    """Density gained at the center [1/s]; for `Instantaneous` the density gained. Negative takes away."""
+    """Rate of density at the center [1/s]; with `Instantaneous`, the density added. Negative rates remove."""
     radius: float
     """Sigma of the Gaussian [longer side]."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Source.center", self.center))
@@ -45,50 +45,50 @@ class Source:
         check_radius("Source.radius", self.radius)
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """What it pours from `start` to `end` [s]."""
+        """The density added from `start` to `end` [s]."""
         amount = self.rate * self.envelope.integral(start, end)
         return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, amount=amount)
 
     def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
-        """As `LocalForce.pull_back`, with respect to "rate", "radius", center and envelope."""
+        """As `LocalForce.pull_back`: with respect to "rate", "radius", center and envelope."""
         shape = shape_slopes(self.center, start, end, bar)
         return impulse_slopes("rate", self.rate, self.envelope, start, end, bar.amount) | shape
 
 
 @dataclass(frozen=True, eq=False)
 class PaintedSource:
-    """Pours density where a picture paints it: the painted values [1/s] times the envelope."""
+    """A source of density that is painted over the picture: the painted rate times the envelope."""
 
     paint: Painted
-    """Density gained [1/s]; for `Instantaneous` the density gained."""
+    """Rate of density [1/s]; with `Instantaneous`, the density added."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
 
     def pull_back(self, start: float, end: float, bar: float) -> Slopes:
-        """As of `FieldForce`: with respect to the envelope, from `bar`, the gradient to its integral."""
+        """The gradient with respect to the envelope, from `bar`, that with respect to its integral."""
         return scaled(self.envelope.slopes(start, end), bar, "envelope.")
 
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Something dissolved in the fluid that moves with it, spreads, and is seen over the picture.
+    """A substance that the fluid transports and that is drawn over the picture.
 
     Raises:
-        ValueError: a value outside its range.
+        ValueError: a value outside its range; the message states the range.
     """
 
     name: str = "ink"
-    """What it is called, where a `Buoyancy` or an output speaks of it."""
+    """Name, by which `Buoyancy` and outputs refer to the density."""
     diffusion: float = 0.0
-    """kappa [longer side^2/s]: what starts as a point has spread to a sigma of sqrt(2 kappa t)."""
+    """Diffusivity kappa [longer side^2/s]: a point spreads to a Gaussian of sigma sqrt(2 kappa t)."""
     initial: Painted | None = None
-    """What is there at the beginning; nothing by default."""
+    """Density at time 0; 0 by default."""
     sources: Sequence[Source | PaintedSource] = ()
-    """S: what is poured in."""
+    """Sources S."""
     color: tuple[float, float, float] = INK
-    """Its colour, red, green, blue, 0 … 1 in linear light."""
+    """Colour: red, green, blue, 0 … 1 in linear light."""
     look: str = "ink"
-    """"ink" lets through color^rho of the light, "smoke" covers 1 - exp(-rho) of what is behind."""
+    """"ink" multiplies the picture by color^rho; "smoke" covers it with opacity 1 - exp(-rho)."""
 
     def __post_init__(self) -> None:
         if not self.name:

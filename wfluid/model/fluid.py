@@ -1,4 +1,4 @@
-"""What the picture is made of: the fluid's parameters."""
+"""The fluid: its material, boundary conditions and numerical scheme."""
 
 from __future__ import annotations
 
@@ -16,40 +16,41 @@ from wfluid.model.painted import Freeze, Keyed, Painted, Quantity, as_quantity, 
 
 @dataclass(frozen=True, kw_only=True)
 class Fluid:
-    """Viscosity, walls, and how the equations are solved.
+    """Material, boundary conditions and numerical scheme of the fluid.
 
     Raises:
-        ValueError: a value outside its range, with the range.
+        ValueError: a value outside its range; the message states the range.
+        TypeError: a freeze or a density of another type, or a viscosity that is no quantity.
     """
 
     viscosity: Quantity | np.ndarray = VISCOSITY
-    """Kinematic viscosity mu [longer side^2/s], 0 … 1000: a number (the paper's figure 2: 0.001 …
-    0.005), an array (height, width) of any size over the picture, a `Painted` picture, `Keyed` ones, or
-    a function of the time [s] that gives any of these."""
+    """Kinematic viscosity mu [longer side^2/s], 0 … 1000: a number (0.001 … 0.005 in Bonilla & Velho, figure
+    2), an array (height, width) of any size, which covers the picture, a `Painted` picture, `Keyed` values,
+    or a function of the time [s] that returns any of these."""
     viscosity_moves: bool = False
-    """Whether a painted viscosity moves with the picture, instead of staying where it is painted."""
+    """Whether a painted viscosity moves with the picture; otherwise it stays in place."""
     freeze: Freeze | None = None
-    """What holds parts of the picture in place."""
+    """Mask that holds parts of the picture in place."""
     densities: Sequence[Density] = ()
-    """What is dissolved in it: ink, smoke; each with a name of its own."""
+    """Densities such as ink and smoke, with different names."""
     walls: Walls | str = field(default_factory=Walls)
-    """Condition at the picture's edges: a `Walls`, or "free-slip", "no-slip", "periodic" or two of
-    them as "x,y"."""
+    """Boundary conditions at the edges: `Walls`, or "free-slip", "no-slip", "periodic", or one for each axis
+    as "x,y"."""
     scheme: str = SCHEMES[0]
-    """"standard": midpoint traces, cubic interpolation; "paper": Euler traces, bilinear interpolation
-    and Jacobi solves, to reproduce it."""
+    """"standard": midpoint backtraces and cubic interpolation. "paper": Euler backtraces, bilinear
+    interpolation and Jacobi solves, as in Bonilla & Velho."""
     solver: str | None = None
-    """"multigrid" (the standard scheme's default) or "jacobi" (the paper's)."""
+    """"multigrid" (default of the standard scheme) or "jacobi" (default of the paper's)."""
     pressure_cycles: int = CYCLES
-    """Multigrid cycles a projection: 3 leave 3e-4 of the divergence, 4 leave 1.4e-5."""
+    """Multigrid cycles per projection: 3 cycles leave 3e-4 of the divergence, 4 leave 1.4e-5."""
     diffusion_tolerance: float = 7e-3
-    """Part of a step's viscous change that a diffusion may leave undone, 1e-14 … 0.5: Chebyshev sweeps
-    where few of them do, else two or more multigrid cycles."""
+    """Relative error of the viscous change of a step, 1e-14 … 0.5. Chebyshev sweeps are used if few suffice,
+    otherwise two or more multigrid cycles."""
     pressure_tolerance: float = 5e-4
-    """Part of a projection that may be left undone where drag jumps and it is solved to a tolerance instead
-    of by `pressure_cycles`, 1e-14 … 0.5."""
+    """Relative residual of a projection with discontinuous drag, 1e-14 … 0.5; such projections are solved to
+    this tolerance, and `pressure_cycles` does not apply."""
     sweeps: int = 50
-    """Jacobi sweeps a solve, with solver="jacobi"."""
+    """Jacobi sweeps per solve with solver="jacobi"."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "walls", Walls.parse(self.walls))
@@ -64,7 +65,9 @@ class Fluid:
         if not all(isinstance(density, Density) for density in self.densities):
             raise TypeError("densities: expected Density objects")
         if len(set(self.density_names)) < len(self.densities):
-            raise ValueError(f"densities {', '.join(self.density_names)}: two have one name")
+            raise ValueError(
+                f"densities {', '.join(self.density_names)}: two have one name; give each its own"
+            )
         check_word("scheme", self.scheme, SCHEMES)
         default = "jacobi" if self.scheme == "paper" else "multigrid"
         solver = default if self.solver is None else self.solver
@@ -79,7 +82,7 @@ class Fluid:
 
     @property
     def density_names(self) -> tuple[str, ...]:
-        """What the densities are called."""
+        """Names of the densities."""
         return tuple(density.name for density in self.densities)
 
     @property
@@ -89,11 +92,11 @@ class Fluid:
 
     @property
     def uniform(self) -> bool:
-        """Whether one viscosity, and no drag, holds everywhere and at all times."""
+        """Whether the viscosity is one constant number and there is no drag."""
         return isinstance(self.viscosity, float) and self.freeze is None
 
     @property
     def separable(self) -> bool:
-        """Whether the two components of the velocity may be diffused apart from each other."""
+        """Whether the components of the velocity diffuse independently: uniform, and no no-slip wall."""
         walls = self.boundary
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)

@@ -1,8 +1,8 @@
-"""What moves the fluid, as frozen descriptions: a shape in space times an envelope in time.
+"""Forces, as frozen descriptions: a shape in space times an envelope in time.
 
-Most shapes are Gaussians g = exp(-|x - c|^2 / 2 sigma^2) about a center c that may move, or such times a
-low power of x - c: `GaussianImpulse` holds the numbers of one over a step. The others are fields over the
-whole picture (`Field`), made once.
+A `LocalForce` is a Gaussian g = exp(-|x - c|^2 / 2 sigma^2) about a center c that may move, or g times a low
+power of x - c; `GaussianImpulse` holds its parameters over a step. A `FieldForce` is a field over the entire
+picture, computed once.
 """
 
 from __future__ import annotations
@@ -23,109 +23,117 @@ from wfluid.domain.walls import Walls
 from wfluid.model.painted import Painted
 
 FORCE_LIMIT = 1e4
-"""Largest force the solver is tested with [longer side/s^2]."""
+"""Largest acceleration that the solver is tested with [longer side/s^2]."""
 
 LEAST_RADIUS, MOST_RADIUS = 1e-6, 1e3
-"""Radii that single precision holds [longer side]."""
+"""Smallest and largest radius, limited by single precision [longer side]."""
 
 
 @dataclass(frozen=True)
 class GaussianImpulse:
-    """What a Gaussian of one force does over one step; r = (x - center) / radius, g = exp(-r^2 / 2)."""
+    """The effect of a local force over one step, with r = (x - center) / radius and g = exp(-r^2 / 2)."""
 
     center: Place
-    """Where it is [longer side]."""
+    """Center at the middle of the step [longer side]."""
     radius: float
-    """Sigma [longer side]."""
+    """Sigma of the Gaussian [longer side]."""
     push: Place = (0.0, 0.0)
-    """Velocity gained at the center: push g [longer side/s]."""
+    """Velocity added: push g [longer side/s]."""
     turn: float = 0.0
-    """Velocity gained around it: turn (-r_y, r_x) g [longer side/s]."""
+    """Rotational velocity added: turn (-r_y, r_x) g [longer side/s]."""
     swell: float = 0.0
-    """Divergence prescribed at the step's end: swell (1 - r^2 / 2) g [1/s]."""
+    """Divergence prescribed at the end of the step: swell (1 - r^2 / 2) g [1/s]."""
     amount: float = 0.0
-    """Density gained: amount g."""
+    """Density added: amount g."""
 
     @property
     def gained(self) -> float:
-        """Bound of the velocity that the step gains [longer side/s]."""
+        """Upper bound of the velocity added [longer side/s]."""
         return math.hypot(*self.push) + abs(self.turn)
 
 
 class Force(ABC):
-    """Anything that moves the fluid."""
+    """A force on the fluid."""
 
     envelope: Envelope
+    """Factor over time."""
     weight: Painted | None = None
+    """Factor over the picture; 1 everywhere by default."""
 
     def under(self, envelope: Envelope) -> Force:
-        """The same force with its envelope multiplied by another."""
+        """The same force, its envelope multiplied by another one."""
         return replace(self, envelope=product(self.envelope, envelope))  # type: ignore[type-var]  # a dataclass
 
 
 class LocalForce(Force):
-    """A force whose shape is a Gaussian's."""
+    """A force with the shape of a Gaussian."""
+
+    radius: float
+    """Sigma of the Gaussian [longer side]."""
 
     @abstractmethod
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """What it does from `start` to `end` [s]."""
+        """The effect of the force from `start` to `end` [s]."""
 
     def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
-        """Gradient by the force's numbers, from `bar`, that by the numbers of `impulse(start, end)`.
+        """The gradient with respect to the force's parameters.
 
-        The transpose of the derivative of `impulse`, in float64, under attribute paths: "center" (2,),
-        or "center.places" (k, 2) of a `Path`; "envelope.period". What is not there, such as the numbers of
-        a function, is taken as fixed. Nothing by default.
+        `bar` is the gradient with respect to the entries of `impulse(start, end)`; the result is the
+        transposed derivative of `impulse` times `bar`, in float64, by attribute path: "center" (2,),
+        "center.places" (k, 2) for a `Path`, "envelope.period". Parameters that are missing, such as those of
+        a function, count as fixed. Empty by default.
         """
         return {}
 
 
 class FieldForce(Force):
-    """A force that is a field over the picture times an envelope; or a sum of such."""
+    """A field of accelerations over the picture times an envelope, or a sum of such products."""
 
     @abstractmethod
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Accelerations [longer side/s^2] along x, y on the first nx x-faces and ny y-faces, each (ny, nx).
+        """Components of each field along x and y [longer side/s^2], two arrays (ny, nx).
 
-        On closed walls they are 0. Where `integrals` holds the acceleration they are factors without unit.
+        They lie on the first nx x-faces and the first ny y-faces and are 0 on closed walls. If `integrals`
+        contain the acceleration, the fields are factors without unit.
         """
 
     @property
     @abstractmethod
     def reach(self) -> float:
-        """Bound of each field, in the fields' unit [longer side/s^2]."""
+        """Upper bound of the fields, in their unit [longer side/s^2]."""
 
     def integrals(self, start: float, end: float) -> list[float]:
-        """What each field is multiplied by over a step [s]."""
+        """The factor on each field over a step [s]."""
         return [self.envelope.integral(start, end)]
 
     def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
-        """The gradient with respect to the force's numbers, from `bar`, that to each of `integrals`.
+        """The gradient with respect to the force's parameters, as `LocalForce.pull_back`.
 
-        As `LocalForce.pull_back`; the fields, with the numbers that made them, are taken as fixed. By
-        default those of a lone field's envelope, and nothing of several fields.
+        `bar` is the gradient with respect to each of `integrals`. The fields, and parameters that determine
+        them, count as fixed. By default the envelope's parameters for a single field, and empty for several.
         """
         return scaled(self.envelope.slopes(start, end), bar[0], "envelope.") if len(bar) == 1 else {}
 
 
 @dataclass(frozen=True)
 class Group:
-    """Forces with a name, an envelope and a strength in common: edited as one.
+    """Forces with a common envelope and strength.
 
     Raises:
         TypeError: a member that is neither a force nor a group.
+        ValueError: a strength that is not finite.
     """
 
     members: Sequence[Force | Group]
-    """The forces; a group may hold groups."""
+    """The forces; a group may contain groups."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time that all are multiplied by."""
+    """Common factor over time."""
     strength: float = 1.0
-    """Factor that all are multiplied by."""
+    """Common constant factor."""
     name: str = ""
-    """What it is called."""
+    """Name of the group."""
     forces: tuple[Force, ...] = field(init=False, repr=False)
-    """The forces, each under the common envelope and strength."""
+    """The forces, each with the common envelope and strength applied."""
 
     def __post_init__(self) -> None:
         finite("Group.strength", self.strength)
@@ -134,10 +142,10 @@ class Group:
 
 
 def flatten(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
-    """The forces themselves, those of groups in their place.
+    """All forces in order, with each group replaced by its forces.
 
     Raises:
-        TypeError: something that is neither a force nor a group.
+        TypeError: an entry that is neither a force nor a group.
     """
     found: list[Force] = []
     for force in forces:
@@ -155,13 +163,16 @@ def impulse_slopes(
     end: float,
     bar: float | Sequence[float],
 ) -> Slopes:
-    """The gradient with respect to a number and its envelope, from `bar`, that to number times integral."""
+    """The gradient with respect to a parameter and its envelope.
+
+    `bar` is the gradient with respect to the product of the parameter and the envelope's integral.
+    """
     own = np.multiply(bar, envelope.integral(start, end), dtype=np.float64)
     return {name: np.array(own)} | scaled(envelope.slopes(start, end), np.dot(number, bar), "envelope.")
 
 
 def shape_slopes(center: Center, start: float, end: float, bar: GaussianImpulse) -> Slopes:
-    """The gradient with respect to radius and center, from that to those of the blob of a step."""
+    """The gradient with respect to "radius" and center, from `bar`, that with respect to an impulse."""
     radius = np.array(bar.radius, dtype=np.float64)
     return {"radius": radius} | center_slopes(center, (start + end) / 2, bar.center)
 
@@ -169,7 +180,7 @@ def shape_slopes(center: Center, start: float, end: float, bar: GaussianImpulse)
 def on_faces(
     force: Sequence[np.ndarray], weight: Painted | None, grid: Grid, walls: Walls
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A field's components on faces (ny, nx), times the weight's means there, and 0 on closed walls."""
+    """The components of a field on faces (ny, nx), times the weight's means on faces, 0 on closed walls."""
     at_centres = None if weight is None else weight.sample(grid)
     closed = (slice(None), 0), (0, slice(None))
     out = []
@@ -182,20 +193,20 @@ def on_faces(
 
 
 def check_acceleration(what: str, acceleration: float) -> None:
-    """Refuse an acceleration beyond `FORCE_LIMIT` [longer sides/s^2].
+    """Check an acceleration against `FORCE_LIMIT` [longer side/s^2].
 
     Raises:
-        ValueError: with the limit.
+        ValueError: it is larger or NaN; the message states the limit.
     """
     if not acceleration <= FORCE_LIMIT:
         raise ValueError(f"{what} of {acceleration:g}: the limit is {FORCE_LIMIT:g} longer sides/s^2")
 
 
 def check_radius(name: str, value: float) -> None:
-    """Refuse a radius that is none.
+    """Check a radius [longer side].
 
     Raises:
-        ValueError: outside 1e-6 … 1e3 longer sides.
+        ValueError: it is outside 1e-6 … 1e3; the message states the range.
     """
     if not LEAST_RADIUS <= value <= MOST_RADIUS:
         raise ValueError(f"{name} {value}: expected {LEAST_RADIUS:g} … {MOST_RADIUS:g} longer sides")

@@ -1,4 +1,4 @@
-"""Forces under a Gaussian: pushes, vortices, growths."""
+"""Local forces: pushes, vortices and growth, each with the shape of a Gaussian."""
 
 from __future__ import annotations
 
@@ -21,33 +21,34 @@ from wfluid.model.force import (
 from wfluid.model.painted import Painted
 
 GROWTH_RATE_LIMIT = 100.0
-"""Largest prescribed divergence the solver is tested with [1/s]."""
+"""Largest prescribed divergence that the solver is tested with [1/s]."""
 
 STEP_GROWTH = 0.5
-"""Most that a step may grow or shrink: logarithm of the area."""
+"""Largest change of area by one step: absolute logarithm of the ratio of areas."""
 
 
 @dataclass(frozen=True)
 class GaussianForce(LocalForce):
     """A push around a point: vector exp(-|x - center|^2 / 2 radius^2) times the envelope.
 
-    A moving center is taken at the middle of a step: second order in the step.
+    The paper's force (Bonilla & Velho, section III). A moving center is evaluated at the middle of a step,
+    which is of second order in the step.
 
     Raises:
-        ValueError: a value that is not finite, a radius that is not positive, or a vector beyond
+        ValueError: a value that is not finite, a radius outside 1e-6 … 1e3, or a vector longer than
             1e4 longer sides/s^2.
     """
 
     center: Center
-    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    """Center x, y [longer side], or a `Path` or a function of the time [s] if it moves."""
     vector: tuple[float, float]
-    """Acceleration at the center [longer side/s^2]; for `Instantaneous` the velocity gained."""
+    """Acceleration x, y at the center [longer side/s^2]; with `Instantaneous`, the velocity gained."""
     radius: float
     """Sigma of the Gaussian [longer side]."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("GaussianForce.center", self.center))
@@ -56,7 +57,7 @@ class GaussianForce(LocalForce):
         check_radius("GaussianForce.radius", self.radius)
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """The vector times the envelope's integral."""
+        """The push: the vector times the envelope's integral."""
         impulse = self.envelope.integral(start, end)
         push = (self.vector[0] * impulse, self.vector[1] * impulse)
         return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, push=push)
@@ -69,25 +70,26 @@ class GaussianForce(LocalForce):
 
 @dataclass(frozen=True)
 class VortexForce(LocalForce):
-    """A twirl: spin (-(y - center_y), x - center_x) exp(-|x - center|^2 / 2 radius^2) times the envelope.
+    """A rotation: spin (-(y - center_y), x - center_x) exp(-|x - center|^2 / 2 radius^2) times the envelope.
 
-    It is free of divergence, so that no pressure takes a part of it: in a free flow the center turns by
-    the double integral of spin times envelope. Positive spins turn clockwise on the screen (x towards y).
+    The field is free of divergence, so that the pressure does not reduce it: in a free flow the center turns
+    by the double time integral of spin times envelope. Positive spins turn clockwise on the screen (from x to
+    y).
 
     Raises:
-        ValueError: as `GaussianForce`; the limit holds for spin times radius.
+        ValueError: as `GaussianForce`; the limit applies to spin times radius.
     """
 
     center: Center
-    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    """Center x, y [longer side], or a `Path` or a function of the time [s] if it moves."""
     spin: float
-    """Angular acceleration at the center [rad/s^2]; for `Instantaneous` the angular velocity gained."""
+    """Angular acceleration at the center [rad/s^2]; with `Instantaneous`, the angular velocity gained."""
     radius: float
-    """Sigma of the Gaussian [longer side]; the force is strongest there, spin radius exp(-1/2)."""
+    """Sigma of the Gaussian [longer side]; at this distance the force is largest, spin radius exp(-1/2)."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("VortexForce.center", self.center))
@@ -96,7 +98,7 @@ class VortexForce(LocalForce):
         check_acceleration("vortex", abs(self.spin) * self.radius)
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """Spin times radius times the envelope's integral."""
+        """The turn: spin times radius times the envelope's integral."""
         turn = self.spin * self.radius * self.envelope.integral(start, end)
         return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, turn=turn)
 
@@ -110,30 +112,31 @@ class VortexForce(LocalForce):
 
 @dataclass(frozen=True)
 class Growth(LocalForce):
-    """Grow (rate > 0) or shrink: a prescribed divergence rate (1 - r^2 / 2) exp(-r^2 / 2) times the envelope.
+    """Growth or shrinking: a prescribed divergence rate (1 - r^2 / 2) exp(-r^2 / 2) times the envelope.
 
-    r is the distance from the center in radii. The ring beyond r = sqrt(2) gives way for what the middle
-    takes, their integrals cancel, and the velocity that belongs to it in free space is
-    rate / 2 (x - center) exp(-r^2 / 2): the center stays, and areas there grow by exp of the integral of
-    rate times envelope. Where walls cut the ring the mean over the picture is taken off. Areas are not
-    preserved. A step prescribes the mean over its length, which carries the picture in the next step: the
-    whole is exact whatever the step, once a step has passed after its end. What is frozen grows too; give
-    a `weight` that spares it.
+    r is the distance from the center in radii. The ring beyond r = sqrt(2) shrinks by as much as the middle
+    grows, so that the integral of the divergence is 0. In free space its velocity is
+    rate / 2 (x - center) exp(-r^2 / 2): the center stays in place, and areas at the center grow by the factor
+    exp(integral of rate times envelope). If walls cut the ring, the mean over the picture is subtracted.
+
+    Each step prescribes the mean of the rate over its length, and the resulting velocity moves the picture in
+    the next step. The growth is therefore complete one step after its end, for any length of the steps.
+    Frozen places grow too, unless the `weight` excludes them.
 
     Raises:
-        ValueError: as `GaussianForce`; a rate beyond 100/s.
+        ValueError: as `GaussianForce`; a rate beyond 100/s; an instantaneous envelope.
     """
 
     center: Center
-    """Point (x, y) [longer side]; a `Path` or a function of the time [s] where it moves."""
+    """Center x, y [longer side], or a `Path` or a function of the time [s] if it moves."""
     rate: float
-    """Divergence at the center [1/s]."""
+    """Divergence at the center [1/s]; negative rates shrink."""
     radius: float
     """Sigma of the Gaussian [longer side]."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture; the mean of what is left is taken off."""
+    """Factor over the picture, 1 everywhere by default; the mean of the product is subtracted."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", as_center("Growth.center", self.center))
@@ -141,13 +144,15 @@ class Growth(LocalForce):
         if not abs(self.rate) <= GROWTH_RATE_LIMIT:
             raise ValueError(f"growth of {self.rate:g}/s: the limit is {GROWTH_RATE_LIMIT:g}/s")
         if isinstance(self.envelope, Instantaneous):
-            raise ValueError("a growth takes time: give it a window instead of an instant")
+            raise ValueError(
+                "a growth with an instantaneous envelope: expected a window, such as Constant(start, end)"
+            )
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """The rate's mean over the step."""
+        """The swell: the mean of the rate over the step."""
         length = end - start
-        course = self.envelope.integral(start, end) / length if length > 0 else self.envelope.value(start)
-        mean = self.rate * course
+        factor = self.envelope.integral(start, end) / length if length > 0 else self.envelope.value(start)
+        mean = self.rate * factor
         return GaussianImpulse(place_at(self.center, (start + end) / 2), self.radius, swell=mean)
 
     def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
@@ -156,5 +161,5 @@ class Growth(LocalForce):
         if end > start:
             mean = bar.swell / (end - start)
             return impulse_slopes("rate", self.rate, self.envelope, start, end, mean) | shape
-        course = scaled(self.envelope.value_slopes(start), self.rate * bar.swell, "envelope.")
-        return {"rate": np.array(self.envelope.value(start) * bar.swell)} | course | shape
+        over_time = scaled(self.envelope.value_slopes(start), self.rate * bar.swell, "envelope.")
+        return {"rate": np.array(self.envelope.value(start) * bar.swell)} | over_time | shape

@@ -1,4 +1,4 @@
-"""Forces that a picture paints: along the slopes or the contours of its intensity, or drawn as vectors."""
+"""Forces from a picture: along the gradient or the contours of its intensity, or vectors in its channels."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture, as_stored, resample
 
 _FLAT = 1e-5
-"""Range of intensities below which slopes are rounding."""
+"""Range of intensities below which the gradient is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class ImageForce(FieldForce):
     """A force field from a picture, times an envelope (Bonilla & Velho, section III).
 
-    "gradient" pushes towards brighter places, "contour" along lines of equal intensity with the brighter
-    side to the right; both are as strong as said where the blurred picture is steepest. "vectors" reads
-    the first two channels as the force along x (right) and y (down).
+    - "gradient" pushes towards brighter places.
+    - "contour" pushes along lines of equal intensity, with the brighter side to the right.
+    - "vectors" reads the first two channels as the force along x (right) and y (down).
 
-    The pressure of an incompressible fluid balances the gradient of any picture wholly: alone it moves
-    nothing. It acts where a `weight` makes it no gradient. Contours are free of divergence and act in full.
+    The first two are normalised: their maximum, where the blurred picture is steepest, is `strength`. The
+    pressure of an incompressible fluid balances any gradient field completely, so that "gradient" moves
+    nothing without a non-uniform `weight`. "contour" is free of divergence and acts in full.
 
     Raises:
         ValueError: an unknown kind, a value that is not finite, a strength beyond 1e4 longer sides/s^2, a
-            picture without slopes, or one of a single channel where vectors are asked for.
+            constant picture, or "vectors" of a picture with one channel.
     """
 
     picture: Picture | np.ndarray
@@ -42,14 +43,14 @@ class ImageForce(FieldForce):
     kind: str = "gradient"
     """"gradient", "contour" or "vectors"."""
     strength: float = 1.0
-    """Acceleration [longer side/s^2] where the slope is steepest, or of vectors of length one; for
-    `Instantaneous` the velocity gained."""
+    """Acceleration [longer side/s^2] where the picture is steepest, or of vectors of length 1; with
+    `Instantaneous`, the velocity gained."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
     radius: float = IMAGE_BLUR
-    """Sigma of the blur before slopes are taken [longer side]; 0 for none."""
+    """Sigma of the blur before the gradient is taken [longer side]; 0 for no blur."""
     _values: np.ndarray = field(init=False, repr=False)
     """Intensities (height, width), or vectors (height, width, 2)."""
 
@@ -69,12 +70,16 @@ class ImageForce(FieldForce):
 
     @property
     def reach(self) -> float:
-        """Largest acceleration [longer side/s^2]."""
+        """Upper bound of the acceleration [longer side/s^2]."""
         longest = np.linalg.norm(self._values, axis=2).max() if self.kind == "vectors" else 1.0
         return abs(self.strength) * float(longest)
 
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The force on the faces, as strong as said."""
+        """One field: the acceleration on the faces.
+
+        Raises:
+            ValueError: the picture is constant after averaging and blurring.
+        """
         if self.kind == "vectors":
             centres = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
             force = [mean_with_before(centres[..., n], 1 - n, walls.periodic[n]) for n in (0, 1)]
@@ -82,7 +87,9 @@ class ImageForce(FieldForce):
             values = resample(self._values.astype(np.float32), grid.nx, grid.ny).astype(np.float64)
             values = blurred(values, grid, self.radius, walls.periodic)
             if np.ptp(values) < _FLAT:
-                raise ValueError("ImageForce: blurred to the grid's cells the picture has no slopes left")
+                raise ValueError(
+                    "ImageForce: the picture has no slopes left after the blur; use a smaller radius"
+                )
             force = _slopes(values, grid, self.kind, walls.periodic)
             steepest = float(np.hypot(*force).max())
             force = [f / steepest for f in force]
@@ -90,9 +97,10 @@ class ImageForce(FieldForce):
 
 
 def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
-    """Vectors (height, width, 2): arrays and float files as they are, integers with zero at half range.
+    """Vectors (height, width, 2) from a picture or an array.
 
-    The code 128 of 8-bit files, 32768 of 16-bit ones, is zero; the least and the greatest are about one.
+    Arrays and float files are used unchanged. In integer files code 128 of 8 bits, or 32768 of 16 bits, is 0,
+    and the smallest and largest codes are about -1 and 1.
 
     Raises:
         ValueError: fewer than two channels, or values that are not finite.
@@ -101,7 +109,9 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
         values, alpha = as_stored(picture), picture.alpha
         channels = picture.color_channels[:2]
         if len(channels) < 2:
-            raise ValueError("a picture of vectors needs two channels")
+            raise ValueError(
+                f"a picture of vectors has {len(channels)} colour channels: it needs two channels"
+            )
         opacity = 1.0 if alpha is None else values[..., [alpha]]
         values = values[..., channels]
         codes = {"uint8": 255, "uint16": 65535}.get(picture.dtype)
@@ -113,12 +123,12 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
         if values.ndim != 3 or values.shape[2] < 2:
             raise ValueError(f"vectors of shape {values.shape}: expected (height, width, 2)")
     if not np.isfinite(values[..., :2]).all():
-        raise ValueError("vectors that are not finite")
+        raise ValueError("vectors that are not finite: expected finite numbers")
     return values[..., :2]
 
 
 def _slopes(values: np.ndarray, grid: Grid, kind: str, periodic: tuple[bool, bool]) -> list[np.ndarray]:
-    """The gradient on faces, or turned a quarter: (d/dy, -d/dx) of the means at nodes."""
+    """The gradient on faces, or the gradient turned by 90 degrees: (d/dy, -d/dx) of means at nodes."""
     if kind == "gradient":
         before_x, before_y = (before(values, axis, periodic[1 - axis]) for axis in (1, 0))
         return [(values - before_x) / grid.hx, (values - before_y) / grid.hy]

@@ -1,5 +1,7 @@
-"""Curl noise: a random force without divergence, the same at any grid (after Bridson, Hourihan &
-Nordenstam, Curl-noise for procedural fluid flow, ACM Trans. Graph. 26, 2007).
+"""Curl noise: a random force without divergence that does not depend on the grid.
+
+Source: R. Bridson, J. Hourihan, M. Nordenstam, Curl-noise for procedural fluid flow, ACM Trans. Graph. 26,
+2007.
 """
 
 from __future__ import annotations
@@ -9,48 +11,49 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wfluid.domain.envelopes import Constant, Envelope, Oscillator, product
+from wfluid.domain.envelopes import Constant, Envelope, product
 from wfluid.domain.grid import Grid
+from wfluid.domain.oscillator import Oscillator
 from wfluid.domain.piecewise import ease, finite
 from wfluid.domain.walls import Walls
 from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
 from wfluid.model.painted import Painted
 
 MODES = 48
-"""Waves that are added up."""
+"""Number of plane waves in the sum."""
 
 _SPREAD = 0.5
-"""Wave numbers lie between (1 - this) and (1 + this) of that of the scale."""
+"""Relative spread of wave numbers: they lie between 1 - this and 1 + this times that of the scale."""
 
 _PEAK = 2 * math.sqrt(2 * MODES)
-"""Bound of the force over its root mean square: all waves at their steepest, and the slope of the ramps."""
+"""Upper bound of the force relative to its root mean square: all waves and ramps at their steepest."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseForce(FieldForce):
     """Turbulence: the curl (d psi/d y, -d psi/d x) of a random stream function psi, times the envelope.
 
-    psi is a sum of plane waves with random directions and phases, so it does not depend on the grid. Over
-    half a scale it goes to 0 at closed walls; an axis that wraps has whole waves. Taken as differences of
-    psi at nodes the force is free of divergence to rounding, hence acts in full (with a `weight` it is not).
-    Of noise that changes `pull_back` gives nothing.
+    psi is a sum of plane waves with random directions and phases, independent of the grid. Near closed walls
+    it falls to 0 over half a scale; along a periodic axis the number of waves is an integer. The force is
+    computed by differences of psi at nodes. It is therefore free of divergence up to rounding and acts in
+    full, unless there is a `weight`. For noise with a period, `pull_back` is empty.
 
     Raises:
-        ValueError: a value outside its range.
+        ValueError: a value outside its range; the message states the range.
     """
 
     strength: float
     """Root mean square of the acceleration away from walls [longer side/s^2]."""
     scale: float = 0.2
-    """Mean wavelength [longer side]: an eddy is half of it."""
+    """Mean wavelength [longer side], twice the size of an eddy."""
     seed: int = 0
-    """Which noise: a whole number from 0 on."""
+    """Seed of the random numbers, an integer from 0 on."""
     period: float | None = None
-    """Time in which it changes and comes back [s]; it stands still by default."""
+    """Time after which the changing noise repeats [s]; by default the noise is constant."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
         finite("NoiseForce.strength", self.strength)
@@ -67,16 +70,16 @@ class NoiseForce(FieldForce):
 
     @property
     def reach(self) -> float:
-        """The strength, several times: no place has more [longer side/s^2]."""
+        """Upper bound of the acceleration, a multiple of the strength [longer side/s^2]."""
         return abs(self.strength) * _PEAK
 
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The curl on faces; two of them, a quarter of a period apart, where the noise changes."""
+        """The curl on faces; with a period, two fields a quarter of a period apart."""
         random = np.random.default_rng(self.seed)
         return [self._curl(random, grid, walls) for _ in range(1 if self.period is None else 2)]
 
     def integrals(self, start: float, end: float) -> list[float]:
-        """The envelope's; times cosine and sine of a period where the noise changes."""
+        """The envelope's integral [s]; with a period, the integrals of the envelope times cosine and sine."""
         if self.period is None:
             return super().integrals(start, end)
         waves = (Oscillator(period=self.period, phase=phase, centred=False) for phase in (0.25, 0.0))
@@ -90,7 +93,7 @@ class NoiseForce(FieldForce):
 
 
 def _waves(random: np.random.Generator, scale: float, grid: Grid, walls: Walls) -> np.ndarray:
-    """A stream function at the nodes, (ny + 1, nx + 1), whose gradient has a root mean square of 1."""
+    """A stream function at nodes, (ny + 1, nx + 1), whose gradient has root mean square 1."""
     angle, phase = random.uniform(0, 2 * math.pi, (2, MODES))
     number = 2 * math.pi / scale * random.uniform(1 - _SPREAD, 1 + _SPREAD, MODES)
     wave = np.stack([number * np.cos(angle), number * np.sin(angle)])
@@ -102,7 +105,7 @@ def _waves(random: np.random.Generator, scale: float, grid: Grid, walls: Walls) 
             longest = min(longest, 2 * length)  # no eddy is longer than the picture between walls
     still = ~wave.any(axis=0)  # rounded to nothing: one wave along an axis that wraps
     wave[int(not walls.periodic[0]), still] = 2 * math.pi / lengths[int(not walls.periodic[0])]
-    # a wave that rounding or the draw made longer is not made steeper for it
+    # long waves, drawn or rounded, keep the amplitude of the longest allowed wave
     amplitude = math.sqrt(2 / MODES) / np.maximum(np.hypot(*wave), (1 - _SPREAD) * 2 * math.pi / longest)
     x, y = (np.arange(n + 1) * h for n, h in ((grid.nx, grid.hx), (grid.ny, grid.hy)))
     along_x = np.exp(1j * np.outer(x, wave[0]))
@@ -111,7 +114,7 @@ def _waves(random: np.random.Generator, scale: float, grid: Grid, walls: Walls) 
 
 
 def _ramps(length: float, grid: Grid, walls: Walls) -> np.ndarray:
-    """1 inside, falling smoothly to 0 within `length` of closed walls, at the nodes."""
+    """A factor at nodes, (ny + 1, nx + 1): 1 inside, with smooth ramps of `length` to 0 at closed walls."""
     factors = []
     for n, size, periodic in (
         (grid.ny, grid.height, walls.periodic[1]),

@@ -1,8 +1,8 @@
-"""Values painted over the picture: viscosity and freezing by pictures, arrays and time.
+"""Quantities that vary over the picture and in time, such as viscosity and drag.
 
-A picture paints by its intensity, 0 … 1 of its number type's range and never of its own darkest and
-brightest values, times a scale (Bonilla & Velho, section III). A painting of any size is stretched over
-the picture and averaged onto the grid's cells.
+A painted quantity is the intensity of a picture times a scale (Bonilla & Velho, section III). The intensity,
+0 … 1, is relative to the range of the file's number type, not to the darkest and brightest values. Paintings
+of any size cover the picture and are averaged onto the cells of the grid.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from wfluid.pictures.picture import Picture, intensity, resample
 
 @dataclass(frozen=True, eq=False)
 class Painted:
-    """A quantity painted over the picture: what a picture shows, times a scale.
+    """A quantity painted over the picture: floor + (scale - floor) times the intensity of a picture or array.
 
     Raises:
         ValueError: a value that is negative or not finite, an array that is not two-dimensional,
-            `invert` of values beyond 0 … 1, or a floor above the scale.
+            `invert` with values above 1, or a floor above the scale.
     """
 
     picture: Picture | np.ndarray
-    """A picture, whose intensity 0 … 1 counts, or an array (height, width) of values from 0 on."""
+    """A picture, of which the intensity 0 … 1 is used, or an array (height, width) of values from 0 on."""
     scale: float = 1.0
-    """What full intensity stands for."""
+    """Value of intensity 1."""
     invert: bool = False
-    """Whether dark is much, instead of bright."""
+    """Whether the intensity is replaced by 1 - intensity, so that dark places have large values."""
     floor: float = 0.0
-    """What no intensity stands for."""
+    """Value of intensity 0."""
     values: np.ndarray = field(init=False, repr=False)
-    """What is painted, (height, width) of the painting."""
+    """The painted values, (height, width) of the painting."""
 
     def __post_init__(self) -> None:
         if isinstance(self.picture, Picture):
@@ -58,11 +58,11 @@ class Painted:
             raise ValueError(f"floor {self.floor:g} is above scale {self.scale:g}")
 
     def sample(self, grid: Grid) -> np.ndarray:
-        """The means over the grid's cells, (ny, nx)."""
+        """Means over the cells of a grid, (ny, nx)."""
         return _on_grid(self, grid)
 
     def resampled(self, width: int, height: int) -> np.ndarray:
-        """The means over pixels of another size, (height, width)."""
+        """Means over the pixels of another size, (height, width)."""
         if self.values.shape == (height, width):
             return self.values.astype(np.float64)
         values = resample(self.values.astype(np.float32), width, height)
@@ -71,14 +71,15 @@ class Painted:
 
 @dataclass(frozen=True, eq=False)
 class Keyed:
-    """A quantity given at some times, with straight lines between them and no change outside.
+    """A quantity given at some times, interpolated linearly and constant before and after.
 
     Raises:
-        ValueError: no keys, or a time that is not finite.
+        ValueError: no keys, a time that is not finite, or a value out of range.
+        TypeError: a value that is no quantity.
     """
 
     keys: Mapping[float, float | np.ndarray | Painted]
-    """Value by time [s]."""
+    """Values by time [s]."""
 
     def __post_init__(self) -> None:
         if not self.keys or not all(math.isfinite(t) for t in self.keys):
@@ -87,7 +88,7 @@ class Keyed:
         object.__setattr__(self, "keys", keys)
 
     def at(self, t: float, grid: Grid) -> np.ndarray | float:
-        """The value at time t [s]: one number, or (ny, nx)."""
+        """The value at time t [s]: a number, or (ny, nx) for the cells of a grid."""
         times = list(self.keys)
         n, m, s = interval(times, t)
         start, end = (sample_at(self.keys[times[key]], grid, t) for key in (n, m))
@@ -95,27 +96,27 @@ class Keyed:
 
 
 Quantity = float | Painted | Keyed | Callable[[float], object]
-"""What a viscosity may be: one number, a painting, keys over time, or a function of the time."""
+"""A viscosity: a number, a painting, keys over time, or a function of the time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Freeze:
-    """A mask that holds the picture in place where it is painted: drag, by degrees.
+    """A mask that holds parts of the picture in place by drag.
 
-    Drag (1 + strength)^m - 1 for paint m of 0 … 1: none where there is none, and each further degree of
-    paint multiplies it, so that a soft edge of the mask is a soft edge of the stillness.
+    The drag is (1 + strength)^m - 1 for mask values m of 0 … 1: it is 0 for m = 0 and grows exponentially, so
+    that a soft edge of the mask is a soft transition of the motion.
 
     Raises:
-        ValueError: a strength outside 0 … 1e6, paint outside 0 … 1, or paint over everything, which
-            would leave nothing to move.
+        ValueError: a strength outside 0 … 1e6, mask values outside 0 … 1, or a mask that freezes the entire
+            picture.
     """
 
     mask: Picture | np.ndarray
-    """White, or 1, stays; black, or 0, is free."""
+    """Picture or array (height, width): white (1) is held in place, black (0) is free."""
     strength: float = DRAG
-    """Drag of full paint [1/s]."""
+    """Drag of white [1/s]."""
     paint: Painted = field(init=False, repr=False)
-    """The mask's paint."""
+    """The mask values, 0 … 1."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.strength <= DRAG_LIMIT:
@@ -130,16 +131,16 @@ class Freeze:
             )
 
     def sample(self, grid: Grid) -> np.ndarray:
-        """Drag [1/s] of the grid's cells, (ny, nx)."""
+        """Drag of the cells of a grid [1/s], (ny, nx)."""
         return np.expm1(self.paint.sample(grid) * math.log1p(self.strength))
 
 
 def as_quantity(name: str, what: object) -> Quantity:
-    """A quantity, from what a user may give for one.
+    """A quantity from a user's value: arrays become `Painted`, numbers are checked.
 
     Raises:
         ValueError: a number outside 0 … 1000, or painted values that are negative or not finite.
-        TypeError: something that is no quantity.
+        TypeError: a value that is no quantity; the message lists the possible types.
     """
     if isinstance(what, Painted | Keyed) or callable(what):
         return what
@@ -155,10 +156,11 @@ def as_quantity(name: str, what: object) -> Quantity:
 
 
 def sample_at(what: Quantity | np.ndarray, grid: Grid, t: float) -> np.ndarray | float:
-    """A quantity at time t [s]: one number, or (ny, nx) for the grid's cells.
+    """A quantity at time t [s]: a number, or (ny, nx) for the cells of a grid.
 
     Raises:
-        ValueError: a function of the time gave something negative, infinite or of no use.
+        ValueError: a function of the time returned a value out of range.
+        TypeError: a function of the time returned a value that is no quantity.
     """
     if isinstance(what, float):
         return what
@@ -171,10 +173,10 @@ def sample_at(what: Quantity | np.ndarray, grid: Grid, t: float) -> np.ndarray |
 
 
 def check_painted(viscosity: np.ndarray | float) -> None:
-    """Refuse viscosities above the limit.
+    """Check viscosities against `VISCOSITY_LIMIT` [longer side^2/s].
 
     Raises:
-        ValueError: with the limit.
+        ValueError: a larger one, or NaN; the message states the limit.
     """
     if not np.max(viscosity) <= VISCOSITY_LIMIT:
         raise ValueError(f"viscosity up to {np.max(viscosity):g}: expected 0 … {VISCOSITY_LIMIT:g}")

@@ -1,4 +1,4 @@
-"""A force along a stroke of the pen."""
+"""A force that moves along a stroke."""
 
 from __future__ import annotations
 
@@ -18,25 +18,26 @@ from wfluid.model.painted import Painted
 
 @dataclass(frozen=True)
 class Stroke(LocalForce):
-    """A drag along a polyline: a Gaussian that moves along a path and pushes the way it goes.
+    """A brush stroke: a Gaussian that moves along a path and pushes in the direction of its motion.
 
-    Its acceleration |V| V strength / (radius sqrt(2 pi)), V the path's velocity, gives a free particle
-    on the path the velocity `strength` V by the time it has passed.
+    The acceleration is |V| V strength / (radius sqrt(2 pi)), with the velocity V of the path. It gives a free
+    particle on the path the velocity `strength` V once the Gaussian has passed.
 
     Raises:
         ValueError: as `GaussianForce`.
+        TypeError: a path that is no `Path`.
     """
 
     path: Path
-    """Where the brush is."""
+    """Center over time."""
     radius: float
     """Sigma of the Gaussian [longer side]."""
     strength: float = 1.0
-    """Part of the brush's velocity that a free particle on its path takes on."""
+    """Velocity of a free particle on the path, relative to that of the path."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time, beside the path's own."""
+    """Further factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.path, Path):
@@ -46,7 +47,7 @@ class Stroke(LocalForce):
         check_acceleration("stroke", max(math.hypot(*push) for _, _, push in self._pieces(self.strength)))
 
     def _pieces(self, strength: float) -> Iterator[tuple[float, float, Place]]:
-        """From when to when one of a strength pushes how [longer side/s^2]."""
+        """Start and end [s] of each segment of the path, and its acceleration [longer side/s^2]."""
         knots = zip(self.path.times, self.path.places, strict=True)
         for (t0, (x0, y0)), (t1, (x1, y1)) in itertools.pairwise(knots):
             vx, vy = (x1 - x0) / (t1 - t0), (y1 - y0) / (t1 - t0)
@@ -54,7 +55,7 @@ class Stroke(LocalForce):
             yield t0, t1, (vx * factor, vy * factor)
 
     def impulse(self, start: float, end: float) -> GaussianImpulse:
-        """The pieces of the path within the step, each in its direction."""
+        """The sum over the path's segments within the step."""
         px, py = 0.0, 0.0
         for t0, t1, (ax, ay) in self._pieces(self.strength):
             if t0 < end and t1 > start:
@@ -64,14 +65,14 @@ class Stroke(LocalForce):
         return GaussianImpulse(self.path.at((begin + stop) / 2), self.radius, push=(px, py))
 
     def pull_back(self, start: float, end: float, bar: GaussianImpulse) -> Slopes:
-        """With respect to "strength", "radius" and envelope; the path is taken as fixed."""
+        """With respect to "strength", "radius" and envelope; the path counts as fixed."""
         own = 0.0
-        course = scaled(self.envelope.slopes(start, start), 0.0, "envelope.")
+        over_time = scaled(self.envelope.slopes(start, start), 0.0, "envelope.")
         for t0, t1, push in self._pieces(1.0):
             if t0 < end and t1 > start:
                 part, along = (max(t0, start), min(t1, end)), np.dot(push, bar.push)
                 own += self.envelope.integral(*part) * along
                 for name, slope in self.envelope.slopes(*part).items():
-                    course[f"envelope.{name}"] += self.strength * along * slope
+                    over_time[f"envelope.{name}"] += self.strength * along * slope
         radius = bar.radius - self.strength * own / self.radius
-        return {"strength": np.array(own), "radius": np.array(radius)} | course
+        return {"strength": np.array(own), "radius": np.array(radius)} | over_time

@@ -1,4 +1,4 @@
-"""Forces that are the same everywhere: wind and buoyancy."""
+"""Forces with one direction everywhere: wind and buoyancy."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from wfluid.model.painted import Painted
 
 @dataclass(frozen=True)
 class Wind(FieldForce):
-    """One acceleration everywhere.
+    """The same acceleration everywhere.
 
-    Between closed walls the pressure balances it wholly and nothing moves; along a periodic axis it
-    blows, and a `weight` lets it blow anywhere.
+    Between closed walls the pressure balances a wind completely and nothing moves. It moves the fluid along a
+    periodic axis, or with a non-uniform `weight`.
 
     Raises:
         ValueError: as `GaussianForce`.
     """
 
     vector: tuple[float, float]
-    """Acceleration [longer side/s^2]; for `Instantaneous` the velocity gained."""
+    """Acceleration x, y [longer side/s^2]; with `Instantaneous`, the velocity gained."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
     weight: Painted | None = None
-    """Where it acts: a factor painted over the picture."""
+    """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vector", place("Wind.vector", self.vector))
@@ -40,11 +40,11 @@ class Wind(FieldForce):
 
     @property
     def reach(self) -> float:
-        """1: its fields are directions, and how strong it is their integrals say."""
+        """1: the fields are unit directions; `integrals` contain the acceleration."""
         return 1.0
 
     def fields(self, grid: Grid, walls: Walls) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The directions of x and of y on all faces within the walls; so its vector may vary."""
+        """Two fields, the directions of x and y on all faces, so that the vector can be a free parameter."""
         one, none = np.ones((grid.ny, grid.nx)), np.zeros((grid.ny, grid.nx))
         return [on_faces(force, self.weight, grid, walls) for force in ((one, none), (none, one))]
 
@@ -60,23 +60,26 @@ class Wind(FieldForce):
 
 @dataclass(frozen=True)
 class Buoyancy(Force):
-    """A density's push on the fluid: the density times a vector times the envelope; smoke rises.
+    """A force proportional to a density: the density times a vector times the envelope, such as rising smoke.
 
     Raises:
         ValueError: as `GaussianForce`.
     """
 
     density: str
-    """Name of the `Density` that is read."""
+    """Name of the `Density`."""
     vector: tuple[float, float] = (0.0, -1.0)
-    """Acceleration where the density is 1 [longer side/s^2]; y points down."""
+    """Acceleration x, y for density 1 [longer side/s^2]; y points down."""
     envelope: Envelope = field(default_factory=Constant)
-    """Course in time."""
+    """Factor over time."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vector", place("Buoyancy.vector", self.vector))
         check_acceleration("buoyancy", math.hypot(*self.vector))
 
     def pull_back(self, start: float, end: float, bar: Sequence[float]) -> Slopes:
-        """With respect to "vector" (2,) and envelope, from `bar` (2,), that to vector times integral."""
+        """The gradient with respect to "vector" (2,) and envelope.
+
+        `bar` (2,) is the gradient with respect to the vector times the envelope's integral.
+        """
         return impulse_slopes("vector", self.vector, self.envelope, start, end, bar)

@@ -1,1 +1,1 @@
-"""One picture flows into another."""
+"""Morphs: one picture flows into another."""

@@ -7,9 +7,9 @@
 >>> write_animation("morph.gif", morph_of_two.frames(), fps=12)
 [PosixPath('morph.gif')]
 
-Keyframes take the points of the first picture a to those of the second, b, within the time of one flow. After
-a part of that time the first is seen through the flow's map to its start, the second through the map to its
-end: what corresponds lies at one place in both, and they are blended.
+Keyframes take the points of the first picture a to those of the second picture b within the time of one flow.
+At any time of the flow, a is warped by the map to the start and b by the map to the end. Corresponding points
+then coincide, and the two pictures are blended.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ LEAST_JACOBIAN = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Morph:
-    """Two pictures on one flow; iterate over `frames()`."""
+    """A morph of two pictures with the flow between them; iterate over `frames()`."""
 
     match: Match
     """The forces of the flow, and the residuals of its keyframes."""
@@ -72,18 +72,18 @@ class Morph:
 
     @property
     def frame_count(self) -> int:
-        """Frames shown."""
+        """Number of frames."""
         return len(self.settings.order)
 
     @cached_property
     def passage(self) -> FlowMaps:
-        """The maps of the flow, computed when they are first asked for."""
+        """The maps of the flow, computed at the first access."""
         animation = self.animation
         return flow_maps(animation.solver, animation.forces, animation.timeline)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Changes to the timing mask that a user should know; asking runs the flow if there is a mask."""
+        """Changes to the timing mask that a user should know; with a mask, the first access runs the flow."""
         sigma, side = self._timing[1], max(self.animation.picture.width, self.animation.picture.height)
         if not sigma:
             return ()
@@ -143,7 +143,7 @@ class Morph:
         return tracks[step] + (at - step) * (tracks[step + 1] - tracks[step])
 
     def frames(self) -> Run[MorphFrame]:
-        """The frames in the order of the settings; the first and the last are the pictures themselves."""
+        """The frames in the order of the settings; the first and the last equal the two pictures."""
         seconds = RunTimes()
         return Run(self._frames(seconds), self.frame_count, seconds)
 
@@ -220,16 +220,22 @@ def morph(
     progress: Callable[[Progress], object] = lambda progress: None,
     **settings,
 ) -> Morph:
-    """A morph of picture a into picture b, which searches for its flow (minutes on a large grid).
+    """A morph of picture a into picture b. The search for its flow takes minutes on a large grid.
 
-    `points` are pairs of points that correspond, (n, 2, 2) or (n, 4): x, y in a [longer side of a] and x, y
-    in b [longer side of b]. `pins` are places of a that stay. The frames are as large as a, or as `settings`
-    say, which are those of `Animation`: cells, width, height, filter, edge, device. `fit` says how b covers
-    them ("fill", "fit" with bars, "stretch"); the others are those of `MorphSettings` and `match_keyframes`.
+    - `points`: corresponding points, (n, 2, 2) or (n, 4): x, y in a [longer side of a], x, y in b [longer
+    side
+      of b].
+    - `pins`: points of a that stay in place [longer side of a].
+    - `fit`: fit of b to the frame of a: "fill" (cropped), "fit" (with bars) or "stretch".
+    - `settings`: those of `Animation`: cells, width, height, filter, edge, device. Frames have the size of a
+    by
+      default.
+
+    `MorphSettings` and `match_keyframes` document the other arguments.
 
     Raises:
-        ValueError: no points, or not pairs of two numbers; points outside a, or outside what is seen of b;
-            what `MorphSettings`, `paired` and `match_keyframes` refuse.
+        ValueError: no points, or points that are not pairs of two numbers; points outside a, or outside the
+            visible part of b; arguments that `MorphSettings`, `paired` or `match_keyframes` refuse.
     """
     shape = MorphSettings(
         Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
@@ -249,10 +255,10 @@ def morph(
 
 
 def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:
-    """Points that correspond.
+    """Corresponding points as pairs of places.
 
     Raises:
-        ValueError: other than pairs of places.
+        ValueError: an array that is not (n, 2, 2) or (n, 4).
     """
     try:
         rows = np.asarray(points, dtype=np.float64).reshape(max(1, len(points)), -1)

@@ -1,4 +1,4 @@
-"""The settings of a morph: curves in time, blending, order of frames."""
+"""The settings of a morph: timing curves, blending, order of frames."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class MorphSettings:
     """
 
     timeline: Timeline
-    """When frames are shown; the first is the one picture, the last the other."""
+    """Times of the frames; the first frame is the first picture, the last frame the second."""
     warp_curve: str | Curve | Mapping[float, float] = EASE
-    """Fraction of their ways that points have covered: "linear", "ease", or values 0 … 1 by time [s]."""
+    """Fraction of the points' ways that is covered: "linear", "ease", or values 0 … 1 by time [s]."""
     blend_curve: str | Curve | Mapping[float, float] = EASE
     """Weight of the second picture in the blend, given in the same way."""
     blend: str = "linear"
@@ -36,9 +36,9 @@ class MorphSettings:
     delay: float = DELAY
     """Delay where the mask is black, a fraction of the duration."""
     reverse: bool = False
-    """From the second picture to the first: the same frames, the last one first."""
+    """Whether the frames are shown in reverse, from the second picture to the first."""
     pingpong: bool = False
-    """There and back, without end: the frames between are shown again after the last."""
+    """Whether the frames between the ends are repeated in reverse after the last, for an endless loop."""
 
     def __post_init__(self) -> None:
         for name in ("warp_curve", "blend_curve"):
@@ -53,7 +53,7 @@ class MorphSettings:
 
     @property
     def order(self) -> list[int]:
-        """The frames by their number from the first picture's on, in the order they are shown."""
+        """Indices of the frames, counted from the first picture, in the order of display."""
         frames = list(range(self.timeline.frames))
         frames = frames[::-1] if self.reverse else frames
         return frames + frames[-2:0:-1] if self.pingpong else frames

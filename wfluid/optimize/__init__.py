@@ -1,1 +1,1 @@
-"""L-BFGS and its line search: a library of its own."""
+"""L-BFGS and its line search, independent of the other packages."""

@@ -1,4 +1,4 @@
-"""Minimise a smooth function of many numbers by limited-memory BFGS.
+"""Minimisation of a smooth function of many variables by limited-memory BFGS.
 
 >>> def value_and_gradient(x):
 ...     return float(np.sum((x - 3) ** 4)), 4 * (x - 3) ** 3
@@ -6,43 +6,11 @@
 >>> found.x.round(1), found.status.name
 (array([3., 3.]), 'CONVERGED')
 
-Each iteration goes along -H g, where H is BFGS's approximation of the inverse Hessian made of the last few
-steps s and differences y of the gradient g, as far as `line_search` says (J. Nocedal, S. J. Wright, Numerical
-Optimization, 2nd ed., algorithms 7.4 and 7.5). Without memory, at first and after a search that failed, it
-goes along -g. Of the function nothing is known but its values and gradients; where they are not finite, or it
-raises FloatingPointError, a step was too far.
-
-Settings
-
-    memory              how many pairs s, y are kept; >= 1, 10. More (up to 30) saves evaluations where each
-                        is dear, at 5 n multiplications and 2 n numbers a pair.
-    gradient_tolerance  CONVERGED where max |g_i| <= this; >= 0, 1e-6. In units of f over units of x: set it
-                        by what a change of x is worth to you. Zero: only where g = 0.
-    change_tolerance    SMALL_CHANGE after an iteration with f_k - f_(k+1) <= this max(|f_k|, |f_(k+1)|);
-                        >= 0 and < 1, 0, which is never. Set 1e-3 or so where the last per mille is not worth
-                        its evaluations.
-    iterations          at most so many, counted from the very first start; >= 0, 1000.
-    evaluations         at most so many, likewise; >= 1, 2000. The number that costs time.
-    decrease            c1 of the line search, f(x + a d) <= f(x) + c1 a g.d; > 0 and < 1/2, 1e-3. Leave it.
-    curvature           c2, |g(x + a d).d| <= c2 |g.d|; > decrease and < 1, 0.9. Smaller makes searches
-                        longer and iterations fewer, which rarely pays.
-    noise               part of |f| by which values may be wrong: a step may end so much higher than the
-                        lowest where slopes say that it is right; >= 0 and < 1, 1e-10. For functions that
-                        compute in single precision 1e-6.
-    first_step          |x_1 - x_0| of the first trial, as of any without memory; > 0, 1. Set it to how far x
-                        should move, at a guess, where that is not of the order of 1.
-
-Statuses
-
-    CONVERGED     the gradient is as small as asked
-    SMALL_CHANGE  an iteration lowered f by no more than change_tolerance
-    FLAT          ten iterations lowered neither f nor the gradient: their precision is reached
-    NO_PROGRESS   nothing lower was found, not even straight downhill: gradient and values disagree, or
-                  their precision is reached
-    ITERATIONS    the limit of iterations is reached
-    EVALUATIONS   the limit of evaluations is reached, perhaps within a line search
-    STOPPED       the callback said so
-    NOT_FINITE    f or its gradient is not finite at the start
+Each iteration searches along -H g. H is the BFGS approximation of the inverse Hessian from the last few steps
+s and gradient differences y (J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., algorithms 7.4 and
+7.5). Without such pairs, at the start and after a failed search, the direction is -g. `line_search` chooses
+the length of the step. A step to a point where the function is not finite, or raises FloatingPointError, is
+too long. `Settings` documents the parameters, `Status` the outcomes.
 """
 
 from __future__ import annotations
@@ -50,154 +18,107 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
-from numbers import Integral
 from typing import Any
 
 import numpy as np
 
 from wfluid.optimize.line_search import Rules, Sample, search
+from wfluid.optimize.settings import Settings, Status
 
 LEAST_CURVATURE = float(np.finfo(np.float64).eps)
-"""A pair is kept if s.y > this |y|^2: else the curvature that it tells of is rounding, or negative."""
+"""A pair is kept if s.y > LEAST_CURVATURE |y|^2; otherwise its curvature is negative, or only rounding."""
 
 PATIENCE = 10
-"""Iterations that may pass without a lower value or a smaller gradient than all before."""
+"""Number of iterations after which a minimisation ends if they lower neither the value nor the gradient."""
 
 Function = Callable[[np.ndarray], tuple]
-"""Of x: the value and the gradient there; what it returns beyond is kept as the point's `details`."""
-
-
-class Status(Enum):
-    """Why a minimisation ended; the module says what each means."""
-
-    CONVERGED = "converged"
-    SMALL_CHANGE = "small change"
-    FLAT = "flat"
-    NO_PROGRESS = "no progress"
-    ITERATIONS = "iterations"
-    EVALUATIONS = "evaluations"
-    STOPPED = "stopped"
-    NOT_FINITE = "not finite"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What to stop at, and how to go; the module says what each means and when to change it.
-
-    Raises:
-        ValueError: a setting is outside its legal range.
-    """
-
-    memory: int = 10
-    gradient_tolerance: float = 1e-6
-    change_tolerance: float = 0.0
-    iterations: int = 1000
-    evaluations: int = 2000
-    decrease: float = 1e-3
-    curvature: float = 0.9
-    noise: float = 1e-10
-    first_step: float = 1.0
-
-    def __post_init__(self) -> None:
-        is_count = isinstance(self.memory, Integral)
-        legal = {
-            "memory": (is_count and self.memory >= 1, "a whole number, at least 1"),
-            "gradient_tolerance": (0 <= self.gradient_tolerance < math.inf, "at least 0"),
-            "change_tolerance": (0 <= self.change_tolerance < 1, "at least 0, below 1"),
-            "iterations": (self.iterations >= 0, "at least 0"),
-            "evaluations": (self.evaluations >= 1, "at least 1, that of the start"),
-            "decrease": (0 < self.decrease < 0.5, "above 0, below 1/2"),
-            "curvature": (self.decrease < self.curvature < 1, "above decrease, below 1"),
-            "noise": (0 <= self.noise < 1, "at least 0, below 1"),
-            "first_step": (0 < self.first_step < math.inf, "above 0"),
-        }
-        for name, (is_legal, rule) in legal.items():
-            if not is_legal:
-                raise ValueError(f"{name} is {getattr(self, name)}, must be {rule}")
+"""Maps x (n,) to its value and gradient (n,); further results are kept in `Point.details`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """The function at one place. Its arrays cannot be written."""
+    """One evaluation of the function. Its arrays are read-only."""
 
     x: np.ndarray
+    """Variables, (n,)."""
     value: float
+    """f(x)."""
     gradient: np.ndarray
+    """Gradient of f at x, (n,)."""
     details: tuple = ()
-    """Whatever else the function returned there."""
+    """Further results of the function."""
 
     @property
     def is_finite(self) -> bool:
-        """Whether the function could be evaluated there."""
+        """Whether the value and the gradient are finite."""
         return math.isfinite(self.value) and bool(np.isfinite(self.gradient).all())
 
     @property
     def steepness(self) -> float:
-        """Largest entry of the gradient."""
+        """Largest absolute entry of the gradient."""
         return float(np.abs(self.gradient).max())
 
 
 @dataclass(frozen=True, eq=False)
 class _AtPoint:
-    """Something that is at a point, with what the function is there."""
+    """Shorthands for the entries of a point."""
 
     point: Point
-    """Where it is: of what came of a minimisation where it converged, else the lowest point evaluated."""
+    """The current point; of a `Minimum`, the converged point or else the lowest one evaluated."""
 
     @property
     def x(self) -> np.ndarray:
-        """Where it is."""
+        """Variables at the point, (n,)."""
         return self.point.x
 
     @property
     def value(self) -> float:
-        """f there."""
+        """f at the point."""
         return self.point.value
 
     @property
     def gradient(self) -> np.ndarray:
-        """Its gradient there."""
+        """Gradient of f at the point, (n,)."""
         return self.point.gradient
 
 
 @dataclass(frozen=True, eq=False)
 class Iterate(_AtPoint):
-    """A minimisation between two iterations: all that it needs to go on as if it had never stopped."""
+    """The state of a minimisation between two iterations; `minimise` resumes from it without a difference."""
 
     best: Point
-    """The lowest that it has seen, if only in a line search."""
+    """The lowest point evaluated so far, trials of line searches included."""
     steps: tuple[np.ndarray, ...]
-    """s of the pairs kept, the oldest first."""
+    """Steps s of the pairs in memory, oldest first, each (n,)."""
     differences: tuple[np.ndarray, ...]
-    """y of each."""
+    """Gradient differences y of the pairs, each (n,)."""
     values: tuple[float, ...]
     """f at the start and after each iteration."""
     slopes: tuple[float, ...]
-    """Largest entry of the gradient, likewise."""
+    """Largest absolute entry of the gradient at the start and after each iteration."""
     evaluations: int
-    """So many until here, of the start one."""
+    """Number of evaluations so far, that of the start included."""
 
     @property
     def iteration(self) -> int:
-        """How many are done."""
+        """Number of iterations so far."""
         return len(self.values) - 1
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum(_AtPoint):
-    """What came of a minimisation."""
+    """The result of a minimisation."""
 
     status: Status
-    """Why it ended."""
+    """Why the minimisation ended."""
     evaluations: int
-    """So many in all, those of a line search cut short included."""
+    """Number of evaluations, those of an interrupted line search included."""
     state: Iterate
-    """After the last whole iteration: `minimise` goes on from it."""
+    """The state after the last complete iteration, from which `minimise` can resume."""
 
     @property
     def iterations(self) -> int:
-        """How many were done."""
+        """Number of complete iterations."""
         return self.state.iteration
 
     @property
@@ -220,12 +141,12 @@ def minimise(
     settings: Settings | None = None,
     callback: Callable[[Iterate], bool] | None = None,
 ) -> Minimum:
-    """Find a local minimum of a function downhill from a start, or go on from a state.
+    """Find a local minimum of a function from a start (n,), or resume from a state.
 
-    `callback` is called after every iteration, and ends the minimisation if it returns True.
+    `callback` is called with the state after every iteration; if it returns True, the minimisation ends.
 
     Raises:
-        ValueError: the start is no vector of finite numbers, or a gradient has another shape.
+        ValueError: a start that is not a vector of finite numbers, or a gradient of another shape.
     """
     settings = settings or Settings()
     function = _Counted(value_and_gradient, settings.evaluations)
@@ -251,28 +172,28 @@ def minimise(
 def descent_direction(
     gradient: np.ndarray, steps: tuple[np.ndarray, ...], differences: tuple[np.ndarray, ...]
 ) -> np.ndarray:
-    """-H g by the two loops of Nocedal and Wright's algorithm 7.4, H_0 = (s.y / y.y) of the last pair."""
+    """-H g by the two-loop recursion (Nocedal and Wright, algorithm 7.4); H_0 = s.y / y.y, last pair."""
     pairs = [(s, y, 1 / (s @ y)) for s, y in zip(steps, differences, strict=True)]
-    q, parts = gradient.copy(), []
+    q, alphas = gradient.copy(), []
     for s, y, rho in reversed(pairs):
-        parts.append(rho * (s @ q))
-        q -= parts[-1] * y
+        alphas.append(rho * (s @ q))
+        q -= alphas[-1] * y
     s, y, rho = pairs[-1]
     q /= rho * (y @ y)
-    for (s, y, rho), part in zip(pairs, reversed(parts), strict=True):
-        q += (part - rho * (y @ q)) * s
+    for (s, y, rho), alpha in zip(pairs, reversed(alphas), strict=True):
+        q += (alpha - rho * (y @ q)) * s
     return -q
 
 
 @np.errstate(all="ignore")
 def _downhill(gradient: np.ndarray, length: float) -> np.ndarray:
-    """So far along -g, safe from overflow in its norm."""
+    """A step of a given length along -g; the scaling prevents overflow of the norm."""
     unit = gradient / np.abs(gradient).max()
     return unit * (-length / np.linalg.norm(unit))
 
 
 def _stop(before: Iterate | None, state: Iterate, settings: Settings) -> Status | None:
-    """Whether to end at a state, after an iteration from the one before."""
+    """The status with which the minimisation ends at a state, if it does; `before` is the previous state."""
     if not state.point.is_finite:
         return Status.NOT_FINITE
     if state.point.steepness <= settings.gradient_tolerance:
@@ -285,7 +206,7 @@ def _stop(before: Iterate | None, state: Iterate, settings: Settings) -> Status 
 
 
 def _little_gained(before: Iterate, after: Iterate, settings: Settings) -> Status | None:
-    """Whether an iteration gained so little that it should be the last."""
+    """The status if an iteration gained too little to continue."""
     if not (_is_lower_of_late(after.values) or _is_lower_of_late(after.slopes)):
         return Status.FLAT
     least = settings.change_tolerance * max(abs(before.value), abs(after.value))
@@ -294,12 +215,12 @@ def _little_gained(before: Iterate, after: Iterate, settings: Settings) -> Statu
 
 
 def _is_lower_of_late(history: tuple[float, ...]) -> bool:
-    """Whether the last few are lower than all before, or there are only few."""
+    """Whether one of the last `PATIENCE` entries is below all earlier ones, or there are no earlier ones."""
     return len(history) <= PATIENCE or min(history[-PATIENCE:]) < min(history[:-PATIENCE])
 
 
 def _descend(function: _Counted, state: Iterate, settings: Settings) -> tuple[Point, bool] | None:
-    """The next point, and whether the memory led there; None if there is none, even along -g."""
+    """The next point, and whether the pairs in memory led to it; None if even -g leads to no lower point."""
     if state.steps:
         direction = descent_direction(state.gradient, state.steps, state.differences)
         if point := _along(function, state, direction, settings):
@@ -309,7 +230,7 @@ def _descend(function: _Counted, state: Iterate, settings: Settings) -> tuple[Po
 
 
 def _along(function: _Counted, state: Iterate, direction: np.ndarray, settings: Settings) -> Point | None:
-    """Where a search along a direction ends, whose first trial is all of it."""
+    """The point at which a line search along a direction ends; its first trial is the full step."""
 
     def sample(step: float) -> Sample:
         point = function(_ahead(state.x, step, direction))
@@ -326,13 +247,13 @@ def _along(function: _Counted, state: Iterate, direction: np.ndarray, settings: 
 
 @np.errstate(all="ignore")
 def _ahead(x: np.ndarray, step: float, direction: np.ndarray) -> np.ndarray:
-    """So far along a direction."""
+    """The point at a step along a direction."""
     return x + step * direction
 
 
 @np.errstate(all="ignore")
 def _slope(point: Point, direction: np.ndarray) -> float:
-    """Of the function along a direction."""
+    """The derivative of the function along a direction."""
     return float(point.gradient @ direction)
 
 
@@ -340,7 +261,7 @@ def _slope(point: Point, direction: np.ndarray) -> float:
 def _advanced(
     state: Iterate, point: Point, keeps_memory: bool, function: _Counted, settings: Settings
 ) -> Iterate:
-    """The state at the next point, with the pair that leads there if it tells of positive curvature."""
+    """The state at the next point; the new pair is kept if its curvature is positive."""
     steps, differences = (state.steps, state.differences) if keeps_memory else ((), ())
     s, y = _frozen(point.x - state.x), _frozen(point.gradient - state.gradient)
     if s @ y > LEAST_CURVATURE * (y @ y):
@@ -351,11 +272,11 @@ def _advanced(
 
 
 class _Spent(Exception):
-    """There are no evaluations left."""
+    """The limit of evaluations is reached."""
 
 
 class _Counted:
-    """The function, with the number of its evaluations and the lowest of them."""
+    """The function, with the number of its evaluations and the lowest point among them."""
 
     def __init__(self, value_and_gradient: Function, limit: int) -> None:
         self.value_and_gradient = value_and_gradient
@@ -363,7 +284,7 @@ class _Counted:
         self.evaluations = 0
 
     best: Point
-    """The lowest point so far; `begin` or `resume` gives the first."""
+    """The lowest point so far; `begin` or `resume` sets it first."""
 
     def begin(self, x: np.ndarray) -> Iterate:
         """The state at a start."""
@@ -372,12 +293,16 @@ class _Counted:
         return Iterate(point, point, (), (), (point.value,), (point.steepness,), self.evaluations)
 
     def resume(self, state: Iterate) -> Iterate:
-        """The same state, whose evaluations and lowest point are this function's."""
+        """The same state; counting continues from its evaluations and lowest point."""
         self.evaluations, self.best = state.evaluations, state.best
         return state
 
     def __call__(self, x: np.ndarray) -> Point:
-        """Evaluate, if there are evaluations left."""
+        """Evaluate the function.
+
+        Raises:
+            _Spent: the limit of evaluations is reached.
+        """
         if self.evaluations >= self.limit:
             raise _Spent
         self.evaluations += 1
@@ -387,7 +312,7 @@ class _Counted:
         return point
 
     def _evaluate(self, x: np.ndarray) -> Point:
-        """Evaluate on copies, so that neither side can change what the other holds."""
+        """Evaluate on copies, so that neither the caller nor the function can change the other's arrays."""
         try:
             value, gradient, *details = self.value_and_gradient(x.copy())
         except FloatingPointError:
@@ -399,7 +324,7 @@ class _Counted:
 
 
 def _vector(start: Any) -> np.ndarray:
-    """A start of one's own, checked."""
+    """A start given by a user, checked."""
     x = np.array(start, dtype=np.float64)
     if x.ndim != 1 or not x.size or not np.isfinite(x).all():
         raise ValueError(f"the start must be a vector of finite numbers, not {start!r:.60}")
@@ -407,6 +332,6 @@ def _vector(start: Any) -> np.ndarray:
 
 
 def _frozen(array: np.ndarray) -> np.ndarray:
-    """The same array, which from now on cannot be written."""
+    """The same array, made read-only."""
     array.setflags(write=False)
     return array

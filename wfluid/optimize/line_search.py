@@ -1,20 +1,21 @@
-"""How far to go along a line: a step that lowers the function enough and flattens its slope enough.
+"""Line search: a step along a direction that meets the strong Wolfe conditions.
 
-With phi(a) the function a steps along, phi'(0) < 0, the strong Wolfe conditions are
+phi(a) is the function at step a along the direction, with phi'(0) < 0. The conditions, sufficient decrease
+and small slope, are
 
     phi(a) <= phi(0) + decrease a phi'(0)        |phi'(a)| <= curvature |phi'(0)|
 
-Close to a minimum the first compares numbers that differ in rounding alone. In its place will do what it
-says of the slope where phi is a parabola, below a ceiling just above phi(0):
+Close to a minimum the values in the first condition differ by rounding only. The approximate conditions
+replace it by its equivalent for the slope of a parabola, with values up to a ceiling just above phi(0):
 
     phi(a) <= ceiling        phi'(a) <= (2 decrease - 1) phi'(0)
 
-Steps are found as by J. J. Moré, D. J. Thuente, Line Search Algorithms with Guaranteed Sufficient Decrease,
-ACM Transactions on Mathematical Software 20 (1994), 286-307; the second condition is from W. W. Hager,
-H. Zhang, A New Conjugate Gradient Method with Guaranteed Descent, SIAM J. Optim. 16 (2005), eq. 4.1.
-J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., sections 3.1 and 3.5, tells the same more gently.
+The choice of trial steps is from J. J. Moré, D. J. Thuente, Line Search Algorithms with Guaranteed Sufficient
+Decrease, ACM Transactions on Mathematical Software 20 (1994), 286-307. The approximate conditions are from
+W. W. Hager, H. Zhang, A New Conjugate Gradient Method with Guaranteed Descent, SIAM J. Optim. 16 (2005),
+eq. 4.1. An introduction: J. Nocedal, S. J. Wright, Numerical Optimization, 2nd ed., sections 3.1 and 3.5.
 
-Where the function is not finite, the step was too far, and the search goes back.
+A step at which the function is not finite is too long, and the next trial is shorter.
 """
 
 from __future__ import annotations
@@ -26,66 +27,74 @@ from enum import Enum
 from typing import Any
 
 SHORTEST_GROWTH, LONGEST_GROWTH = 1.1, 4.0
-"""How many times the last advance the next one may be, until the minimum is bracketed."""
+"""Least and largest ratio of consecutive advances until the minimum is bracketed."""
 
 CONTRACTION = 0.66
-"""Part of a bracket's length that at least goes in two trials, or the bracket is halved."""
+"""A bracket that two trials leave longer than this fraction of its length is halved."""
 
 RETREAT = 0.5
-"""Part of a step that is left of it where it was too far; squared each further time running, so
-that sixteen decades take six trials."""
+"""Factor on a step that was too long; it is squared for each further one in a row, so that sixteen decades
+take six trials."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The function at one step along the line."""
+    """The function at one step along the direction."""
 
     step: float
+    """Step a."""
     value: float
+    """phi(a)."""
     slope: float
+    """phi'(a)."""
     point: Any = None
-    """What the caller wants back with it."""
+    """The caller's data for this step."""
 
     @property
     def is_finite(self) -> bool:
-        """Whether the function could be evaluated there."""
+        """Whether the value and the slope are finite."""
         return math.isfinite(self.value) and math.isfinite(self.slope)
 
     def tilted(self, slope: float) -> Sample:
-        """The same of the function less a line of that slope."""
+        """The sample of the function minus a line through 0 of this slope."""
         return Sample(self.step, self.value - slope * self.step, self.slope - slope)
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What a step must do, and how much may be spent on finding it."""
+    """Parameters of the conditions, and limits of the search."""
 
     decrease: float = 1e-3
-    """Part of the decrease that the first slope promises which is enough."""
+    """c1: fraction of the decrease predicted by the first slope that suffices."""
     curvature: float = 0.9
-    """Part of the first slope which is flat enough; more than `decrease`, or there may be no such step."""
+    """c2: fraction of the first slope that counts as flat; above `decrease`, so that such a step exists."""
     width: float = 0.1
-    """Part of a step within which it need not be known better: a bracket so short ends the search."""
+    """Relative width of the bracket at which the search ends."""
     evaluations: int = 20
-    """Trials at most."""
+    """Largest number of trials."""
 
 
 class Ending(Enum):
     """Why a search ended."""
 
     WOLFE = "strong Wolfe conditions"
+    """The step meets the strong Wolfe conditions."""
     APPROXIMATE_WOLFE = "approximate Wolfe conditions"
+    """The step meets the approximate conditions."""
     NARROW = "narrow bracket"
+    """The bracket is shorter than `Rules.width`."""
     EXHAUSTED = "too many trials"
+    """The limit `Rules.evaluations` was reached."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """How a search ended."""
+    """The result of a search."""
 
     sample: Sample | None
-    """The step taken: one that meets the conditions, else the lowest lower than the start, else none."""
+    """A step that meets the conditions; else the lowest one below the start; else None."""
     ending: Ending
+    """Why the search ended."""
 
 
 def search(
@@ -96,9 +105,10 @@ def search(
     first: float = 1.0,
     rules: Rules | None = None,
 ) -> Found:
-    """Search from a sample at step 0 whose slope falls, trying the step `first` first.
+    """Search from a sample at step 0 with a negative slope; the first trial is the step `first`.
 
-    `ceiling` is the highest value that rounding alone may excuse, by default that of the start.
+    `along` evaluates the function at a step. `ceiling` is the largest value for the approximate conditions,
+    by default the value at the start.
     """
     rules = rules or Rules()
     ceiling = start.value if ceiling is None else ceiling
@@ -117,7 +127,7 @@ def search(
 
 
 def _met(start: Sample, trial: Sample, ceiling: float, rules: Rules) -> Ending | None:
-    """Which conditions hold at a trial, if any."""
+    """The conditions that a trial meets, if any."""
     if abs(trial.slope) > rules.curvature * -start.slope:
         return None
     if trial.value <= start.value + rules.decrease * trial.step * start.slope:
@@ -127,23 +137,25 @@ def _met(start: Sample, trial: Sample, ceiling: float, rules: Rules) -> Ending |
 
 
 class _Interval:
-    """Where a step must lie that meets the conditions: between `low` and `high`, or beyond `low`.
+    """The interval of steps that may meet the conditions: between `low` and `high`, or beyond `low`.
 
-    Trials that lack decrease but are no higher than `low` are judged by phi(a) - decrease a phi'(0), not phi:
-    its minimum meets both conditions, as decrease < curvature (Moré and Thuente, section 3; their second
-    stage is for curvature below decrease).
+    For trials without sufficient decrease, but not above `low`, the tilted function phi(a) - decrease a
+    phi'(0) replaces phi: as decrease < curvature, its minimum meets both conditions (Moré and Thuente,
+    section 3; their second stage is for curvature below decrease).
     """
 
     def __init__(self, start: Sample, tilt: float) -> None:
         self.start, self.tilt = start, tilt
         self.low = start
-        """The lowest so far, downhill from which the minimum lies."""
+        """The lowest sample so far; the minimum lies in its downhill direction."""
         self.high: Sample | None = None
-        """The other end of the bracket, once there is one."""
+        """The other end of the bracket; None until the minimum is bracketed."""
         self.wall = math.inf
-        """The last step that was too far: while there is no bracket, the least."""
-        self.left = RETREAT
+        """The last step that was too long; without a bracket it is the shortest such step."""
+        self.shrink = RETREAT
+        """Factor on the next step that is too long."""
         self.widths = (math.inf, math.inf)
+        """Lengths of the last two brackets."""
 
     @property
     def lowest(self) -> Sample | None:
@@ -151,22 +163,22 @@ class _Interval:
         return self.low if self.low.value < self.start.value else None
 
     def is_within(self, part: float) -> bool:
-        """Whether its length is at most so much of its further end."""
+        """Whether its length is at most this fraction of its larger end."""
         far = self.wall if self.high is None else self.high.step
         return math.isfinite(far) and abs(far - self.low.step) <= part * max(far, self.low.step)
 
     def retreat(self, step: float) -> float:
-        """The step after one that was too far."""
+        """The trial after a step that was too long."""
         self.wall = step
-        step = self.low.step + self.left * (step - self.low.step)
-        self.left **= 2
+        step = self.low.step + self.shrink * (step - self.low.step)
+        self.shrink **= 2
         return step
 
     def take(self, trial: Sample) -> float:
-        """Shorten the interval by a trial, and say where to go next."""
-        self.left = RETREAT
-        enough = self.start.value + self.tilt * trial.step
-        tilt = self.tilt if enough < trial.value <= self.low.value else 0.0
+        """Shorten the interval by a trial; returns the next step to try."""
+        self.shrink = RETREAT
+        sufficient = self.start.value + self.tilt * trial.step
+        tilt = self.tilt if sufficient < trial.value <= self.low.value else 0.0
         low, new = self.low.tilted(tilt), trial.tilted(tilt)
         high = None if self.high is None else self.high.tilted(tilt)
 
@@ -190,7 +202,7 @@ class _Interval:
         return step if step < self.wall else (self.low.step + self.wall) / 2
 
     def _inside(self, step: float, high: Sample) -> float:
-        """A step within the bracket: the one given unless it is outside or the bracket shrinks too slowly."""
+        """The step if it is inside the bracket and the bracket shrinks fast enough, else the middle."""
         ends = sorted((self.low.step, high.step))
         width = ends[1] - ends[0]
         is_slow = width >= CONTRACTION * self.widths[0]
@@ -199,10 +211,10 @@ class _Interval:
 
 
 def _next_step(low: Sample, high: Sample | None, new: Sample, most: float) -> float:
-    """Where interpolation puts the minimum: the four cases of Moré and Thuente, section 4.
+    """The minimum by interpolation: the four cases of Moré and Thuente, section 4.
 
     Raises:
-        ZeroDivisionError: nowhere.
+        ZeroDivisionError: the interpolation has no minimum.
     """
     if new.value > low.value:
         cubic, quadratic = _cubic(low, new), _quadratic(low, new)
@@ -223,12 +235,12 @@ def _next_step(low: Sample, high: Sample | None, new: Sample, most: float) -> fl
 
 
 def _turns(a: Sample, b: Sample) -> bool:
-    """Whether the function rises at one of them and falls at the other."""
+    """Whether the slopes of two samples have different signs."""
     return (a.slope > 0) != (b.slope > 0)
 
 
 def _cubic(a: Sample, b: Sample) -> float:
-    """Minimum of the cubic through both with their slopes (Nocedal and Wright, eq. 3.59), nan without one."""
+    """Minimum of the cubic through both values and slopes (Nocedal and Wright, eq. 3.59); nan without one."""
     length = b.step - a.step
     theta = 3 * (a.value - b.value) / length + a.slope + b.slope
     scale = max(abs(theta), abs(a.slope), abs(b.slope))
@@ -240,11 +252,11 @@ def _cubic(a: Sample, b: Sample) -> float:
 
 
 def _quadratic(a: Sample, b: Sample) -> float:
-    """Minimum of the parabola through both with the first's slope."""
+    """Minimum of the parabola through both values and the slope at a."""
     length = b.step - a.step
     return a.step + a.slope / ((a.value - b.value) / length + a.slope) / 2 * length
 
 
 def _secant(a: Sample, b: Sample) -> float:
-    """Where a straight line through both slopes is zero."""
+    """Zero of the linear interpolation of both slopes."""
     return b.step + b.slope / (b.slope - a.slope) * (a.step - b.step)

@@ -10,10 +10,10 @@ from wfluid.pictures.picture import Picture
 
 
 def check_light(light: str) -> None:
-    """Refuse an unknown space to blend in.
+    """Check the name of a space to blend in.
 
     Raises:
-        ValueError: with the known ones.
+        ValueError: an unknown name; the message lists the known ones.
     """
     if light not in BLEND_SPACES:
         raise ValueError(f"blend in {light!r} light: expected one of {', '.join(BLEND_SPACES)}")
@@ -22,7 +22,8 @@ def check_light(light: str) -> None:
 def blended(a: Picture, b: Picture, weight: float | np.ndarray, light: str = "linear") -> Picture:
     """(1 - weight) a + weight b, for pictures of one size; the weight is a number or (height, width), 0 … 1.
 
-    A weight of 0 or 1 everywhere gives one of the two pictures, bit by bit.
+    `light` is the space to blend in: "linear" light, or "display" values (sRGB), which data pictures do not
+    have. A weight of 0 or 1 everywhere returns one of the two pictures without rounding.
     """
     weight = np.asarray(weight, dtype=np.float32)
     if not weight.any() or np.all(weight == 1):

@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wfluid.domain.checks import check_word
+from wfluid.domain.limits import QUALITY_LIMIT, TYPES
 from wfluid.system.errors import FileError
 
-COLORSPACES = ("auto", "srgb", "linear", "data")
-
-TYPES = ("uint8", "uint16", "half", "float")
-"""Number types a picture is written with."""
-
 LARGEST = 65504.0
-"""The largest half, which replaces infinite values on reading: filters would spread them as NaN."""
+"""Largest number of type half. It replaces infinite values on reading, which filters would turn into NaN."""
 
 NUMPY = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
 WRITES = {
@@ -40,8 +36,6 @@ _COMPRESSIONS = {
     ".tif": ("none", "lzw", "zip", "packbits"),
     ".tiff": ("none", "lzw", "zip", "packbits"),
 }
-QUALITY_LIMIT = 100
-"""Best quality of a lossy format; 1 is the poorest."""
 
 QUALITIES = {".jpg": "jpeg", ".jpeg": "jpeg", ".webp": "webp"}
 
@@ -50,7 +44,7 @@ LINEAR = ("half", "float")
 
 
 class PictureError(FileError):
-    """A picture that cannot be read or written; the message says which, why and what to do."""
+    """A picture that cannot be read or written; the message names the file, the reason and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +72,10 @@ class Encoding:
             raise PictureError(f"quality {self.quality}: expected 1 … {QUALITY_LIMIT}")
 
     def check(self, path: Path) -> None:
-        """Refuse settings that the format of `path` does not support.
+        """Check the settings against the format of `path`.
 
         Raises:
-            PictureError: an unknown ending, or an unsupported setting, with the supported ones.
+            PictureError: an unknown ending, or an unsupported setting; the message lists the supported ones.
         """
         ending = path.suffix.lower()
         if ending not in WRITES:

@@ -93,7 +93,7 @@ def cropped(picture: Picture, through: Window) -> Picture:
 
 
 def paired(a: Picture, b: Picture, fit: str) -> PicturePair:
-    """Two pictures as a morph needs them: see `window` and `alike`.
+    """The pair of pictures of a morph: fitted as by `window`, with the same channels as by `alike`.
 
     Raises:
         ValueError: an unknown fit, or pictures that cannot be blended.
@@ -132,5 +132,7 @@ def alike(a: Picture, b: Picture) -> tuple[Picture, Picture, list[str]]:
             else:
                 opacity = picture.pixels[..., [picture.alpha]]
             pixels[n] = np.concatenate([pixels[n], opacity], axis=2)
-    a, b = (replace(one, pixels=its, alpha=alpha) for one, its in zip((a, b), pixels, strict=True))
-    return a, b, notes
+    first, second = (
+        replace(picture, pixels=values, alpha=alpha) for picture, values in zip((a, b), pixels, strict=True)
+    )
+    return first, second, notes

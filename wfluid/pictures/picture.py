@@ -23,54 +23,57 @@ class Picture:
     alpha: int | None = None
     """Index of the alpha channel."""
     dtype: str = "float"
-    """Number type of the file it came from: one of `TYPES`."""
+    """Number type of the file that was read: one of `TYPES`."""
     metadata: Any = None
-    """The OpenImageIO `ImageSpec` it came with, for writing."""
+    """The OpenImageIO `ImageSpec` of the file, for writing."""
     srgb: bool | None = None
-    """Whether the file's numbers were sRGB; None: as is usual for its number type."""
+    """Whether the file's numbers are sRGB; None for the default of the number type."""
     data: bool = False
     """Whether the numbers are not colours, so that files store them unconverted."""
 
     @property
     def width(self) -> int:
-        """Pixels along x."""
+        """Number of pixels along x."""
         return self.pixels.shape[1]
 
     @property
     def height(self) -> int:
-        """Pixels along y."""
+        """Number of pixels along y."""
         return self.pixels.shape[0]
 
     @property
     def color_channels(self) -> list[int]:
-        """Indices of all channels but alpha."""
+        """Indices of all channels except alpha."""
         return channels_beside(self.alpha, self.pixels.shape[2])
 
     def resized(self, width: int, height: int) -> Picture:
-        """The picture at another size, filtered against aliasing where it shrinks."""
+        """The picture at another size [px]; shrinking filters against aliasing."""
         if (width, height) == (self.width, self.height):
             return self
         return self.with_pixels(resample(self.pixels, width, height, filter=""))
 
     def shrunk(self, width: int, height: int) -> Picture:
-        """The picture for frames of a size: shrunk where it is larger, against aliasing."""
+        """The picture reduced to at most a size [px], filtered against aliasing; it is never enlarged."""
         return self.resized(min(width, self.width), min(height, self.height))
 
     def with_pixels(self, pixels: np.ndarray) -> Picture:
-        """The same kind of picture with other pixels."""
+        """The picture with other pixels (height, width, channels); everything else is kept."""
         return replace(self, pixels=pixels)
 
 
 def channels_beside(alpha: int | None, channels: int) -> list[int]:
-    """Indices of so many channels but for that of alpha."""
+    """Indices of all channels except alpha."""
     return [channel for channel in range(channels) if channel != alpha]
 
 
 def resample(values: np.ndarray, width: int, height: int, filter: str = "triangle") -> np.ndarray:
     """Values (rows, columns) or (rows, columns, channels) at another size, without aliasing.
 
-    `filter` is one of OpenImageIO's, widened where it shrinks; "" is its best for pictures, which may
-    overshoot; "triangle" keeps within the range of the values.
+    `filter` is a filter of OpenImageIO. "" selects its default for pictures, which may overshoot; "triangle"
+    stays within the range of the values.
+
+    Raises:
+        PictureError: OpenImageIO cannot resize the values.
     """
     import OpenImageIO as oiio
 
@@ -86,7 +89,7 @@ def resample(values: np.ndarray, width: int, height: int, filter: str = "triangl
 
 
 def as_stored(picture: Picture) -> np.ndarray:
-    """The numbers of the picture's file, integers scaled to 0 … 1, colours not multiplied by alpha."""
+    """The numbers of the picture's file (height, width, channels), straight colours, integers as 0 … 1."""
     pixels, alpha, colours = picture.pixels, picture.alpha, picture.color_channels
     stored = pixels.copy()
     if alpha is not None:
@@ -100,14 +103,14 @@ def as_stored(picture: Picture) -> np.ndarray:
 
 
 _RINGING = 1e-3
-"""How far below zero the ringing of a filter may leave a value that was painted 0."""
+"""Largest negative value, in size, that counts as ringing of a filter around 0."""
 
 
 def intensity(picture: Picture) -> np.ndarray:
     """Intensity (height, width), 0 … 1 of the number type's range; transparent is 0.
 
-    It is the luminance of the file's numbers (Rec. 709 weights), which are display values in 8- and 16-bit
-    files, limited to 1 and multiplied by alpha.
+    The intensity is the luminance (Rec. 709 weights) of the file's numbers, which are display values in 8-
+    and 16-bit files, clamped to 1 and multiplied by alpha.
 
     Raises:
         PictureError: a value that is negative or not finite.
@@ -115,7 +118,10 @@ def intensity(picture: Picture) -> np.ndarray:
     pixels, alpha = picture.pixels, picture.alpha
     wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
     if wrong.any():
-        raise PictureError(f"a picture with the value {pixels[wrong].flat[0]} has no intensity there")
+        value = pixels[wrong].flat[0]
+        raise PictureError(
+            f"a picture with the value {value} has no intensity: expected finite values from 0 on"
+        )
     colours = picture.color_channels[:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)
     stored = as_stored(picture)

@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.domain.checks import check_word
+from wfluid.domain.limits import COLORSPACES, TYPES
 from wfluid.pictures import color
 from wfluid.pictures.formats import (
     CHANNELS,
-    COLORSPACES,
     LARGEST,
     LINEAR,
     QUALITIES,
-    TYPES,
     WRITES,
     Encoding,
     PictureError,
@@ -27,7 +26,7 @@ from wfluid.system.memory import free_memory, readable_size
 from wfluid.system.stderr import quiet_stderr
 
 SIDE_LIMIT = 65_535
-"""Longest side of a picture [px]: what most formats, and 32-bit indices, allow."""
+"""Longest side of a picture [px], limited by most formats and by 32-bit indices."""
 
 _NOT_KEPT = ("oiio:UnassociatedAlpha", "oiio:ColorSpace", "compression", "CompressionQuality", "Orientation")
 
@@ -41,19 +40,20 @@ _UPRIGHT = {
     7: lambda a: a.swapaxes(0, 1)[::-1, ::-1],
     8: lambda a: a.swapaxes(0, 1)[::-1],
 }
-"""By EXIF orientation (EXIF 2.32, tag 0x0112): the stored array turned upright."""
+"""Functions that turn a stored array upright, by EXIF orientation (EXIF 2.32, tag 0x0112)."""
 
 
 def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
-    """Read a still in any format that OpenImageIO reads; of several in one file, the first.
+    """Read a still in any format that OpenImageIO reads; of a file with several pictures, the first.
 
-    `colorspace` is that of the file's numbers: "srgb", "linear", "auto" (sRGB for integers, linear for half
-    and float) or "data" (not colours: they are written as they are read). Alpha is never linearised; colours
-    that are not premultiplied are multiplied by it once they are linear. The EXIF orientation is applied.
-    Values that are not finite become 0 or the largest half; with `exact` they are refused.
+    `colorspace` is the encoding of the file's numbers: "srgb", "linear", "auto" (sRGB for integers, linear
+    for half and float) or "data" (no colours; numbers are written as they are read). Alpha is linear in all
+    files. Straight colours are linearised and then multiplied by alpha. The EXIF orientation is applied. NaN
+    becomes 0, infinite values the largest half.
 
     Raises:
-        PictureError: a file that is missing, cannot be read, is damaged or too large for the memory.
+        PictureError: a file that is missing, unreadable, damaged or too large for the memory; with `exact`,
+            also one with values that are not finite.
     """
     import OpenImageIO as oiio
 
@@ -101,12 +101,12 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
 def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
     """Write a still, completely or not at all, in the format of the name's ending.
 
-    The number type is the picture's own where the format has it, else the format's default. Alpha and
-    further channels are dropped where the format does not hold them (alpha over black). Metadata are kept;
-    so are display and data windows, if the size is still that of the source.
+    The number type is that of the picture if the format supports it, otherwise the default of the format.
+    Channels that the format does not support are dropped; without alpha the picture is over black. Metadata
+    are kept, as are display and data windows if the size is unchanged.
 
     Raises:
-        PictureError: a format or setting that does not exist, or the file cannot be written.
+        PictureError: an unknown format, an unsupported setting, or a file that cannot be written.
     """
     import OpenImageIO as oiio
 
@@ -160,7 +160,11 @@ def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):
 
 
 def _check_size(path: Path, spec) -> None:
-    """Refuse dimensions that exceed the memory, before any is allocated."""
+    """Check the size of a picture before memory is allocated.
+
+    Raises:
+        PictureError: a size out of range, or one that exceeds the free memory.
+    """
     if not (1 <= spec.width <= SIDE_LIMIT and 1 <= spec.height <= SIDE_LIMIT and spec.depth == 1):
         size = f"{spec.width} x {spec.height} x {spec.depth}"
         raise PictureError(f"{path}: {size} pixels; sides of 1 … {SIDE_LIMIT} can be read")
@@ -181,8 +185,8 @@ def _type_of(format_name: str) -> str:
 
 
 def _message(library) -> str:
-    """OpenImageIO's message; it may quote bytes of a damaged file that are not text."""
+    """OpenImageIO's message, which cannot be decoded if it quotes bytes of a damaged file."""
     try:
         return library.geterror()
     except UnicodeDecodeError:
-        return "the file's structure makes no sense"
+        return "invalid file structure"

@@ -1,4 +1,4 @@
-"""Chebyshev polynomials: the damping factors that make the most of a number of sweeps or cycles.
+"""Chebyshev polynomials: the best damping factors for a given number of sweeps or cycles.
 
 G. Golub, C. Van Loan, Matrix Computations, 4th ed., 11.2.8.
 """
@@ -17,7 +17,7 @@ def chebyshev_factors(low: float, high: float, count: int) -> np.ndarray:
 
 
 def chebyshev_count(low: float, high: float, tolerance: float) -> int:
-    """The least degree whose Chebyshev polynomial on [low, high] leaves `tolerance` of what it damps."""
+    """The least degree whose Chebyshev polynomial on [low, high] reduces errors by the factor `tolerance`."""
     if high - low < 1e-12 * high:
         return 1
     return max(1, math.ceil(math.acosh(1 / tolerance) / math.acosh((high + low) / (high - low))))

@@ -1,4 +1,4 @@
-"""Conjugate gradients, preconditioned by whatever approximate inverse the caller has."""
+"""Conjugate gradients on the device, preconditioned by an approximate inverse that the caller provides."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from wfluid.solve.multigrid import Level
 
 
 class ConjugateGradients:
-    """Conjugate gradients on the equation of a level, with everything they keep.
+    """Conjugate gradients on the equation of a level, with their vectors and numbers in device memory.
 
-    `precondition(r, z)` writes to z what a symmetric approximate inverse makes of r, both with ghosts;
-    `zero` is a field of zeros a component.
+    `precondition(r, z)` writes z = M r with M a symmetric approximate inverse, r and z with ghosts. `zero`
+    holds a field of zeros per component.
     """
 
     def __init__(
@@ -33,19 +33,22 @@ class ConjugateGradients:
         self._numbers = Scalars(device, "rz", "limit", "length", "ratio")
         self._going, self._iterations = entries(zeros(2, device, wp.int32))
 
-    def ran(self) -> int:
-        """Iterations of the last solve."""
+    def iterations_run(self) -> int:
+        """Number of iterations of the last solve."""
         return int(read(self._iterations)[0])
 
-    def solve(self, b: Vector, x: Vector, tolerance: float, most: int, whole: Vector | None) -> None:
-        """x = A^-1 b to the tolerance in `most` iterations at most; b with ghosts, x comes with ghosts."""
+    def solve(self, b: Vector, x: Vector, tolerance: float, most: int, scale: Vector | None) -> None:
+        """x = A^-1 b, to the tolerance or after `most` iterations. Reads the ghosts of b, fills those of x.
+
+        The tolerance is relative to the lesser of x and `scale`, or to x alone where `scale` is None.
+        """
         alone(lambda: fill(0.0, *x))
         alone(lambda: _copy(b, self.r))
         self.precondition(self.r, self.z)
         alone(lambda: _copy(self.z, self.p))
         products = self._inner.along_rows(self.r, self.z)
-        wholes = self._start.along_rows(*((whole, whole) if whole else (self.r, self.z)))
-        inputs, c = [products, wholes, self._rows, Real(tolerance), most], self._numbers
+        scales = self._start.along_rows(*((scale, scale) if scale else (self.r, self.z)))
+        inputs, c = [products, scales, self._rows, Real(tolerance), most], self._numbers
         krylov.begin.launch(1, self.device, inputs, [c.rz, c.limit, self._going, self._iterations])
         repeat_while(self._going, lambda: self._iterate(x, most))
         self.level.fill(x)
@@ -66,7 +69,7 @@ class ConjugateGradients:
         krylov.measure_ratio.launch(1, device, [products, self._rows, c.limit, most], outputs)
         with together():
             for z, p in zip(self.z, self.p, strict=True):
-                krylov.turn.launch(layout, device, [z, c.ratio], [p])
+                krylov.update_direction.launch(layout, device, [z, c.ratio], [p])
         top.fill(self.p)
 
 

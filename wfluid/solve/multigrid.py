@@ -1,9 +1,9 @@
-"""The multigrid hierarchy: its grids, what a level must be able to do, and the way between two levels.
+"""The multigrid hierarchy: its grids, and the interface of a level.
 
-Jacobi sweeps smooth on every level, the same before and after the coarser level's correction and in
-opposite order; restriction is the prolongation's transpose. So a V-cycle is a symmetric operator. Any
-grid size coarsens, n -> ceil(n/2) per axis (the finer one alone where cells are not square). W. Briggs,
-V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
+Jacobi sweeps smooth on every level: the same sweeps before and after the correction from the coarser level,
+in opposite order. Restriction is the transpose of prolongation. So a V-cycle is a symmetric operator. Any
+grid size can be coarsened, n -> ceil(n/2) per axis; where cells are not square, only along the axis with the
+shorter sides. W. Briggs, V. Henson, S. McCormick, A Multigrid Tutorial, 2nd ed., chapters 3 and 5.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.strips import together
 
 COARSEST = 16
-"""Cells that the coarsest level may have; there a stored inverse solves exactly."""
+"""Most cells of the coarsest level, which is solved exactly by a stored inverse."""
 
 
 @dataclass(frozen=True)
 class Location:
-    """Which points of a grid one component of the unknowns lies on."""
+    """Points of a grid at which one component of the unknowns is given."""
 
     rules: tuple[Rule, Rule]
-    """Continuation beyond the edges along x and y."""
+    """Boundary rule along x and y, which gives the ghosts."""
     on_faces: tuple[bool, bool] = (False, False)
-    """Whether they lie on faces (at i h) instead of centres (at (i + 1/2) h) along x and y."""
+    """Along x and y: True on faces, at i h; False at centres, at (i + 1/2) h."""
 
 
 class Level(ABC):
-    """One grid of the hierarchy with an operator A on it: scratch vectors, ghosts, sweeps.
+    """One grid of the hierarchy with an operator A on it: work vectors, ghosts, sweeps.
 
-    A subclass is an equation. Its sweeps are x + rate M^-1 (b - A x) with a diagonal M of its own.
+    A subclass implements an equation. Its sweeps are x + rate M^-1 (b - A x), M its diagonal matrix.
     """
 
     rates: Sequence[wp.array]
-    """Damping of the sweeps on the way down, in device memory; on the way up in opposite order."""
+    """Damping of the sweeps before the coarse correction, in device memory; after it in opposite order."""
     plain: wp.array
-    """Damping of the paper's plain Jacobi sweeps."""
+    """Damping of the plain Jacobi sweeps of the scheme "paper"."""
 
     def __init__(
         self, nx: int, ny: int, size: tuple[float, float], points: Sequence[Location], device: wp.Device
@@ -57,31 +57,31 @@ class Level(ABC):
 
     @abstractmethod
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
-        """out = b - A x; x with ghosts, out without."""
+        """out = b - A x. Reads the ghosts of x, leaves those of out undefined."""
 
     @abstractmethod
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """out = rate M^-1 b, without ghosts: the sweep from zero."""
+        """out = rate M^-1 b, the sweep from zero. Leaves the ghosts of out undefined."""
 
     @abstractmethod
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
-        """out = x + rate M^-1 (b - A x); x with ghosts, out without."""
+        """out = x + rate M^-1 (b - A x). Reads the ghosts of x, leaves those of out undefined."""
 
     def fill(self, x: Vector) -> None:
-        """Fill the ghosts of x, and zero its faces on walls."""
+        """Fill the ghosts of x, and set its faces on walls to 0."""
         with together():
             for f, ghosts in zip(x, self.ghosts, strict=True):
                 ghosts.fill(f)
 
     def smooth_from_zero(self, b: Vector, rates: Sequence[wp.array], spare: Vector, out: Vector) -> None:
-        """One sweep for each of `rates`, from zero; b and out with ghosts."""
-        at, other = (out, spare) if len(rates) % 2 else (spare, out)
-        self.first_sweep(b, rates[0], at)
-        self.fill(at)
-        self.smooth(b, at, rates[1:], other, out)
+        """Sweep once with each of `rates`, from zero. Reads the ghosts of b, fills those of out."""
+        x, other = (out, spare) if len(rates) % 2 else (spare, out)
+        self.first_sweep(b, rates[0], x)
+        self.fill(x)
+        self.smooth(b, x, rates[1:], other, out)
 
     def smooth(self, b: Vector, x: Vector, rates: Sequence[wp.array], spare: Vector, out: Vector) -> None:
-        """One sweep for each of `rates`, from x to out; x and `spare` are written over."""
+        """Sweep once with each of `rates`, from x to out. Overwrites x and `spare`."""
         for n, rate in enumerate(rates, start=1):
             to = out if n == len(rates) else spare
             self.sweep(b, x, rate, to)
@@ -90,7 +90,7 @@ class Level(ABC):
 
 
 def hierarchy(nx: int, ny: int, size: tuple[float, float]) -> list[tuple[int, int]]:
-    """Cells of every grid, from nx by ny down to `COARSEST` cells."""
+    """Sizes (nx, ny) of all grids, from nx by ny down to at most `COARSEST` cells."""
     grids = [(nx, ny)]
     while grids[-1][0] * grids[-1][1] > COARSEST:
         grids.append(coarser(*grids[-1], size))
@@ -98,9 +98,9 @@ def hierarchy(nx: int, ny: int, size: tuple[float, float]) -> list[tuple[int, in
 
 
 def coarser(nx: int, ny: int, size: tuple[float, float]) -> tuple[int, int]:
-    """Cells of the next coarser grid: each axis halved, but first the one with much finer cells alone.
+    """Size (nx, ny) of the next coarser grid: both axes halved, or only the one with far shorter cells.
 
-    Point smoothers damp only what varies along the finer axis when cells are far from square.
+    Where cells are far from square, a point smoother damps only errors that vary along their shorter side.
     """
     hx, hy = size[0] / nx, size[1] / ny
     halve_x = nx > 1 and (hx < 1.5 * hy or ny == 1)

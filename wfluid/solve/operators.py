@@ -14,38 +14,42 @@ from wfluid.solve.chebyshev import chebyshev_factors
 from wfluid.solve.multigrid import Level, Location
 
 SMOOTHED = 0.45
-"""Least eigenvalue of D^-1 A that the sweeps of a five-point equation damp; what lies below is smooth and
-left to the coarser level. Measured at 256 x 256: three cycles leave 2.3e-4 to 3.0e-4 for any value from
-0.3 to 0.6."""
+"""Least eigenvalue of D^-1 A that the sweeps of a five-point equation damp. Errors below it are smooth: the
+coarser level reduces them. Measured at 256 x 256: after three cycles the residual is 2.3e-4 to 3.0e-4 of b
+for any value from 0.3 to 0.6."""
 
 SMOOTHED_STRESS = 0.14
-"""The same for the coupled equation, of M^-1 A, M the row sums; the highest is 1."""
+"""Least eigenvalue of M^-1 A that the sweeps of the coupled equation damp; the greatest is 1."""
 
 SWEEPS_STRESS = 2
 """Sweeps on each side of the coarse correction in the coupled equation."""
 
 FIVE_POINT_INTERVAL = (0.8, 1.0)
-"""Where the eigenvalues of a cycle times A lie for the five-point equations."""
+"""Interval of the eigenvalues of a cycle times A for the five-point equations."""
 
 STRESS_INTERVAL = (0.65, 1.0)
-"""The same for the coupled equation, where viscosity is smooth: 0.78 constant, 0.72 at a contrast of 50."""
+"""Interval of the eigenvalues of a cycle times A for the coupled equation with smooth viscosity.
+
+The least one measured is 0.78 for constant viscosity, 0.72 at a contrast of 50."""
 
 
 class FivePoint(Level):
-    """shift - scale Lap, constant, of a scalar: diffusion of one component, pressure without drag.
+    """The operator A = shift - scale Lap with constant coefficients, of one component.
 
-    Solved for diffusion (shift 1, scale dt mu) and for pressure (shift 0, scale 1).
+    Diffusion has shift 1 and scale dt mu, pressure without drag shift 0 and scale 1.
     """
 
     def __init__(self, nx: int, ny: int, size: tuple[float, float], points: Location, device: wp.Device):
         super().__init__(nx, ny, size, [points], device)
-        self.numbers = Scalars(device, "centre", "ax", "ay", "own", "near", "first", "second", "plain")
+        self.numbers = Scalars(
+            device, "centre", "ax", "ay", "centre_factor", "neighbour_factor", "first", "second", "plain"
+        )
         self.rates = (self.numbers.first, self.numbers.second)
         self.plain = self.numbers.plain
         self.least = 0.0
 
     def set_coefficients(self, shift: float, scale: float) -> None:
-        """Take the operator shift - scale Lap."""
+        """Set the operator to shift - scale Lap."""
         ax, ay = scale / self.h[0] ** 2, scale / self.h[1] ** 2
         centre = shift + 2 * ax + 2 * ay
         self.least = shift / centre
@@ -54,8 +58,8 @@ class FivePoint(Level):
             centre=centre,
             ax=ax,
             ay=ay,
-            own=(first + second - first * second) / centre,
-            near=first * second / centre**2,
+            centre_factor=(first + second - first * second) / centre,
+            neighbour_factor=first * second / centre**2,
             first=first / centre,
             second=second / centre,
             plain=1 / centre,
@@ -69,7 +73,7 @@ class FivePoint(Level):
         five_point.residual.launch(self.layout, self.device, inputs, out)
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
-        """out = rate b; the rates hold 1 / centre."""
+        """out = rate b; the rates contain 1 / centre."""
         algebra.scale.launch(self.layout, self.device, [*b, rate], out)
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
@@ -79,18 +83,21 @@ class FivePoint(Level):
         five_point.jacobi.launch(self.layout, self.device, inputs, out)
 
     def smooth_from_zero(self, b: Vector, rates, spare: Vector, out: Vector) -> None:
-        """The two sweeps of a cycle in one pass; b with ghosts."""
+        """Sweep from zero; the two sweeps of a cycle take one pass.
+
+        Reads the ghosts of b, fills those of out.
+        """
         if rates is not self.rates:
             super().smooth_from_zero(b, rates, spare, out)
             return
         c = self.numbers
-        inputs = [*b, c.own, c.near, c.ax, c.ay, self.layout.pitch]
+        inputs = [*b, c.centre_factor, c.neighbour_factor, c.ax, c.ay, self.layout.pitch]
         five_point.first_two_sweeps.launch(self.layout, self.device, inputs, out)
         self.fill(out)
 
 
 class VariablePoisson(Level):
-    """-div (beta grad q), beta on the faces: pressure where drag resists."""
+    """The operator A q = -div (beta grad q) with beta on the faces: pressure with drag."""
 
     def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
@@ -120,7 +127,7 @@ class VariablePoisson(Level):
 
 
 class ViscousStress(Level):
-    """v + dt alpha v - dt div (mu (grad v + grad v^T)): variable viscosity and drag, u and v coupled."""
+    """The operator A v = v + dt alpha v - dt div (mu (grad v + grad v^T)), which couples u and v."""
 
     def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
@@ -136,7 +143,7 @@ class ViscousStress(Level):
         self.plain = self.numbers.plain
 
     def set_step(self, dt: float, least: float) -> None:
-        """Take the step dt; `least` is a bound below the eigenvalues of M^-1 A on the finest level."""
+        """Set the time step dt [s]; the eigenvalues of M^-1 A on the finest level are at least `least`."""
         hx, hy = self.h
         rates = chebyshev_factors(max(least, SMOOTHED_STRESS), 1.0, SWEEPS_STRESS)
         self.numbers.set(
@@ -151,13 +158,13 @@ class ViscousStress(Level):
         )
 
     def weigh(self) -> None:
-        """Find M^-1, the weights of the sweeps: launches only; after the medium or the step change."""
+        """Compute M^-1, the weights of the sweeps, after the medium or the step change: launches only."""
         with together():
             for axis, medium in enumerate(self._axes()):
                 stress.weight.launch(self.layout, self.device, medium, [self.weights[axis]])
 
     def _axes(self) -> tuple[list, list]:
-        """The medium, the coefficients and the strides of u, then of v: the same with the axes exchanged."""
+        """Medium, coefficients and strides of u, then of v with the axes exchanged, as in `stress`."""
         c, medium, pitch = self.numbers, [self.medium.mu, self.medium.alpha], self.layout.pitch
         return (
             [*medium, c.dt, c.normal_x, c.shear_y, c.cross, 1, pitch],
@@ -167,27 +174,28 @@ class ViscousStress(Level):
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:
         """out = b - A x."""
         with together():
-            for own, medium in enumerate(self._axes()):
-                inputs = [b[own], x[own], x[1 - own], *medium]
-                stress.residual.launch(self.layout, self.device, inputs, [out[own]])
+            for component, medium in enumerate(self._axes()):
+                inputs = [b[component], x[component], x[1 - component], *medium]
+                stress.residual.launch(self.layout, self.device, inputs, [out[component]])
 
     def first_sweep(self, b: Vector, rate: wp.array, out: Vector) -> None:
         """out = rate M^-1 b."""
         with together():
-            for own in (0, 1):
-                inputs = [b[own], self.weights[own], rate]
-                stress.first_sweep.launch(self.layout, self.device, inputs, [out[own]])
+            for component in (0, 1):
+                inputs = [b[component], self.weights[component], rate]
+                stress.first_sweep.launch(self.layout, self.device, inputs, [out[component]])
 
     def sweep(self, b: Vector, x: Vector, rate: wp.array, out: Vector) -> None:
         """out = x + rate M^-1 (b - A x)."""
         with together():
-            for own, medium in enumerate(self._axes()):
-                inputs = [b[own], x[own], x[1 - own], *medium, self.weights[own], rate]
-                stress.sweep.launch(self.layout, self.device, inputs, [out[own]])
+            for component, medium in enumerate(self._axes()):
+                fields = [b[component], x[component], x[1 - component]]
+                inputs = [*fields, *medium, self.weights[component], rate]
+                stress.sweep.launch(self.layout, self.device, inputs, [out[component]])
 
 
 class CoefficientLevel:
-    """Viscosity and drag on one grid."""
+    """Viscosity, drag and face coefficients on one grid."""
 
     def __init__(self, nx: int, ny: int, walls: Walls, device: wp.Device):
         self.layout = Layout(nx, ny)
@@ -200,11 +208,11 @@ class CoefficientLevel:
         self._ghosts = Ghosts(self.layout, walls.centre_rules(), device)
 
     def fill(self) -> None:
-        """Fill the ghosts of mu and alpha: both continue evenly over a wall."""
+        """Fill the ghosts of mu and alpha by even reflection at walls."""
         self._ghosts.fill(self.mu)
         self._ghosts.fill(self.alpha)
 
     def fill_beta(self) -> None:
-        """Fill the ghosts of beta. On a wall it means nothing: nothing flows there."""
+        """Fill the ghosts of beta. Its values on walls have no effect, since no fluid crosses a wall."""
         for beta in self.beta:
             self._ghosts.fill(beta)

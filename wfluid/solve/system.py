@@ -1,9 +1,9 @@
 """Linear solves: symmetric multigrid cycles, Chebyshev sweeps, conjugate gradients, plain Jacobi sweeps.
 
-All solve A x = b for the equations in `equations`. A fixed number of V-cycles from zero is a symmetric
-linear operator: its adjoint is itself, converged or not. So is a fixed polynomial of the operator, which
-is what sweeps are. Conjugate gradients, preconditioned by the cycle, run to a tolerance instead, where
-coefficients jump and cycles alone would stall. On the coarsest level a stored inverse solves exactly.
+All solve A x = b for the equations in `operators`. A fixed number of V-cycles from zero is a symmetric linear
+operator: it is its own adjoint, converged or not. A fixed number of sweeps is a polynomial of A, so the same
+holds for it. Where coefficients jump, cycles converge slowly; there conjugate gradients, preconditioned by
+the cycle, run to a tolerance instead. On the coarsest level a stored inverse solves exactly.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from wfluid.solve.multigrid import Level
 from wfluid.solve.transfer import Transfer
 
 SWEEP_LIMIT = 14
-"""Chebyshev sweeps that cost about as much as two cycles."""
+"""Most Chebyshev sweeps: they cost about as much as two cycles."""
 
 JUMP_LIMIT = 10.0
-"""Jump of the coefficients within a few cells up to which cycles alone converge as for smooth ones."""
+"""Greatest ratio of coefficients within a few cells at which cycles converge as with smooth coefficients."""
 
 ITERATION_LIMIT = 60
-"""Most iterations of conjugate gradients to `USUAL_TOLERANCE`: tens at contrasts of 1e4, so that more will
-not help."""
+"""Most iterations of conjugate gradients to `USUAL_TOLERANCE`. A contrast of 1e4 takes tens; a solve that
+does not converge in so many does not converge in more."""
 
 USUAL_TOLERANCE = 5e-4
-"""About what three cycles leave."""
+"""Relative residual of about three cycles."""
 
 
 @dataclass(frozen=True)
@@ -46,20 +46,25 @@ class SolveMethod:
     name: str
     """"multigrid", "chebyshev" or "jacobi", which are linear and symmetric; or "conjugate gradients"."""
     iterations: int
-    """Cycles or sweeps, from zero; of conjugate gradients the most."""
+    """Number of cycles or sweeps, from zero; of conjugate gradients the most iterations."""
     tolerance: float = 0.0
-    """Of conjugate gradients: the part of the solution, in the norm of A, that may be missing."""
+    """Of conjugate gradients: the error relative to the solution, both in the norm of A, at which to stop."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What a solve left: the method, how many cycles or sweeps it ran, ||b - A x||, ||b||, ||A|| ||x||."""
+    """The residual of a solve, in Euclidean norms."""
 
     method: str
+    """Name of the method, as of `SolveMethod`."""
     iterations: int
+    """Number of cycles, sweeps or iterations."""
     norm: float
+    """||b - A x||."""
     norm_b: float
+    """||b||."""
     norm_ax: float = 0.0
+    """||A|| ||x||, an upper bound of ||A x||."""
 
     @property
     def relative(self) -> float:
@@ -68,22 +73,22 @@ class Residual:
 
     @property
     def backward(self) -> float:
-        """||b - A x|| / (||b|| + ||A|| ||x||), which rounding keeps above about 1e-7 in float32."""
-        whole = self.norm_b + self.norm_ax
-        return self.norm / whole if whole > 0 else 0.0
+        """||b - A x|| / (||b|| + ||A|| ||x||), the backward error; in float32 it is at least about 1e-7."""
+        scale = self.norm_b + self.norm_ax
+        return self.norm / scale if scale > 0 else 0.0
 
 
 def conjugate_gradients(tolerance: float) -> SolveMethod:
-    """Conjugate gradients to a tolerance, with as many iterations at most as its digits ask for."""
+    """Conjugate gradients to a tolerance; the most iterations are in proportion to its digits."""
     digits = max(1.0, math.log(tolerance) / math.log(USUAL_TOLERANCE))
     return SolveMethod("conjugate gradients", math.ceil(ITERATION_LIMIT * digits), tolerance)
 
 
 class LinearSystem:
-    """An equation on a hierarchy of grids.
+    """An equation A x = b on a hierarchy of grids.
 
-    `interval` holds the eigenvalues of one cycle times A; the factors of several cycles damp it. An
-    equation that leaves a constant free is `singular`: then the mean of b must be zero.
+    `interval` contains the eigenvalues of one cycle times A; the factors of several cycles are chosen for it.
+    `singular` tells that A maps constants to 0: then the mean of b must be 0.
     """
 
     def __init__(
@@ -109,23 +114,23 @@ class LinearSystem:
         self._conjugate: ConjugateGradients | None = None
 
     def invert_coarsest(self) -> None:
-        """Store the inverse of the coarsest level's operator: launches only; after its numbers change."""
+        """Store the inverse of the coarsest level's operator after its coefficients change: launches only."""
         level, n = self.levels[-1], self.unknowns
         layout = level.layout
-        cells, where = layout.nx * layout.ny, [layout.nx, layout.pitch]
+        cells, place = layout.nx * layout.ny, [layout.nx, layout.pitch]
         matrix, other = self._matrices
-        # -1 1^T takes the place of the constant, which a singular operator does not see
+        # a multiple of 1 1^T makes a singular operator invertible: it maps constants to 0
         shift = float(np.prod([1 / h for h in level.h])) / cells if self.singular else 0.0
         zero = level.b
         alone(lambda: fill(0.0, *zero))
         for column in range(n):
             for component, f in enumerate(level.x):
-                dense.unit.launch(cells, self.device, [column - component * cells, *where], [f])
+                dense.unit.launch(cells, self.device, [column - component * cells, *place], [f])
             level.fill(level.x)
             level.residual(zero, level.x, level.r)
             level.fill(level.r)
             for component, f in enumerate(level.r):
-                inputs = [f, column, component * cells, n, *where, shift]
+                inputs = [f, column, component * cells, n, *place, shift]
                 dense.store_column.launch(cells, self.device, inputs, [matrix])
         for pivot in range(n):
             dense.eliminate.launch(n, self.device, [matrix, pivot, n], [other])
@@ -133,42 +138,49 @@ class LinearSystem:
         self.inverse = matrix
 
     def plan_sweeps(self, low: float, high: float, scale: float, tolerance: float) -> SolveMethod | None:
-        """The Chebyshev sweeps that leave at most `tolerance` of any b, or None where cycles cost less.
+        """Chebyshev sweeps that reduce the residual to `tolerance` of b, or None where cycles cost less.
 
-        `low` and `high` bound the eigenvalues of M^-1 A; `scale` is what the sweeps' rates carry of M.
+        `low` and `high` bound the eigenvalues of M^-1 A. The rates of the sweeps are divided by `scale`: the
+        diagonal of A where the level's sweeps do not divide by it, else 1.
         """
         sweeps = chebyshev_count(low, high, tolerance) if low > 0 else SWEEP_LIMIT + 1
         if sweeps > SWEEP_LIMIT:
             return None
         factors = chebyshev_factors(low, high, sweeps)
-        factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]  # short and long in turn
+        # the largest, the smallest, the second largest, …
+        factors = np.stack([factors, factors[::-1]], axis=1).ravel()[:sweeps]
         assign(np.pad(factors / scale, (0, SWEEP_LIMIT - sweeps)), self._rates)
         return SolveMethod("chebyshev", sweeps)
 
     def plan_cycles(self, tolerance: float) -> SolveMethod:
-        """The fewest cycles that leave at most `tolerance` of any b."""
+        """The fewest cycles that reduce the residual to `tolerance` of b."""
         return SolveMethod("multigrid", chebyshev_count(*self.interval, tolerance))
 
     def prepare(self, method: SolveMethod) -> None:
-        """Make ready, before a graph is captured, what a solve keeps on the device."""
+        """Make the arrays of a method in device memory, before a graph is captured."""
         cycles = method.iterations
         if method.name == "multigrid" and cycles not in self._factors:
             factors = chebyshev_factors(*self.interval, cycles) if cycles > 1 else np.ones(1)
             self._factors[cycles] = entries(upload(factors, self.device))
-        if method.name == "conjugate gradients" and self._conjugate is None:
+        if method.name == "conjugate gradients":
+            self._conjugate_gradients()
+
+    def _conjugate_gradients(self) -> ConjugateGradients:
+        if self._conjugate is None:
             self._conjugate = ConjugateGradients(self.levels[0], self.zero, self.cycle, self.device)
+        return self._conjugate
 
-    def solve(self, method: SolveMethod, b: Vector, x: Vector, whole: Vector | None = None) -> None:
-        """x = what the method makes of b. Fills the ghosts of b and x.
+    def solve(self, method: SolveMethod, b: Vector, x: Vector, scale: Vector | None = None) -> None:
+        """Solve A x = b by a method, from zero. Fills the ghosts of b and x.
 
-        Conjugate gradients stop when what x misses is `tolerance` of x, and of `whole` where given.
+        Conjugate gradients stop when the error of x is `tolerance` of x, and of `scale` where it is given.
         """
         self.prepare(method)
         self.levels[0].fill(b)
         if method.name == "multigrid":
             self._cycles(b, x, method.iterations)
         elif method.name == "conjugate gradients":
-            self._conjugate.solve(b, x, method.tolerance, method.iterations, whole)
+            self._conjugate_gradients().solve(b, x, method.tolerance, method.iterations, scale)
         elif method.name == "chebyshev":
             rates = entries(self._rates, slice(method.iterations))
             self.levels[0].smooth_from_zero(b, rates, self.spare, x)
@@ -180,52 +192,57 @@ class LinearSystem:
         """x = `cycles` V-cycles on b, from zero."""
         top = self.levels[0]
         factors = self._factors[cycles]
-        at, other = (x, self.spare) if cycles % 2 else (self.spare, x)
+        new, old = (x, self.spare) if cycles % 2 else (self.spare, x)
         for cycle in range(cycles):
             residual = b
             if cycle:
-                at, other = other, at
-                top.residual(b, other, self.residual)
+                new, old = old, new
+                top.residual(b, old, self.residual)
                 top.fill(self.residual)
                 residual = self.residual
             self.cycle(residual, self.correction)
-            start, factor = other if cycle else self.zero, factors[cycle]
+            start, factor = old if cycle else self.zero, factors[cycle]
             with together():
-                for f, e, out in zip(start, self.correction, at, strict=True):
+                for f, e, out in zip(start, self.correction, new, strict=True):
                     algebra.add_scaled.launch(top.layout, self.device, [f, e, factor], [out])
-            top.fill(at)
+            top.fill(new)
 
     def cycle(self, b: Vector, out: Vector, depth: int = 0) -> None:
-        """out = one V-cycle on b (with ghosts), from zero; out has ghosts and may be the level's y."""
+        """out = one V-cycle on b, from zero.
+
+        Reads the ghosts of b, fills those of out, which may be the level's y.
+        """
         level = self.levels[depth]
         if depth == len(self.levels) - 1:
             self._solve_coarsest(b, out)
             return
-        coarse, between = self.levels[depth + 1], self.transfers[depth]
+        coarse, transfer = self.levels[depth + 1], self.transfers[depth]
         level.smooth_from_zero(b, level.rates, level.r, level.x)
         level.residual(b, level.x, level.r)
-        between.restrict(level.r, coarse.b)
+        transfer.restrict(level.r, coarse.b)
         self.cycle(coarse.b, coarse.y, depth + 1)
-        between.prolong_add(level.x, coarse.y, level.r)
+        transfer.prolong_add(level.x, coarse.y, level.r)
         level.smooth(b, level.r, level.rates[::-1], level.x, out)
 
     def _solve_coarsest(self, b: Vector, out: Vector) -> None:
         level, n = self.levels[-1], self.unknowns
         layout = level.layout
-        cells, where = layout.nx * layout.ny, [layout.nx, layout.pitch]
+        cells, place = layout.nx * layout.ny, [layout.nx, layout.pitch]
         for component, f in enumerate(b):
-            dense.collect.launch(cells, self.device, [f, component * cells, *where], [self._dense])
+            dense.collect.launch(cells, self.device, [f, component * cells, *place], [self._dense])
         for component, f in enumerate(out):
-            inputs = [self.inverse, self._dense, component * cells, n, *where]
+            inputs = [self.inverse, self._dense, component * cells, n, *place]
             dense.multiply.launch(cells, self.device, inputs, [f])
         level.fill(out)
 
     def measure(self, method: SolveMethod, b: Vector, x: Vector, norm_a: float = 0.0) -> Residual:
-        """The true residual of a solve; `norm_a` is a bound of ||A||."""
+        """The true residual of a solve, b - A x; `norm_a` is an upper bound of ||A||."""
         top = self.levels[0]
         top.residual(b, x, self.residual)
         top.fill(self.residual)
         top.fill(b)
-        ran = self._conjugate.ran() if method.name == "conjugate gradients" else method.iterations
-        residual, right, answer = (self.inner.norm(f) for f in (self.residual, b, x))
-        return Residual(method.name, ran, residual, right, norm_a * answer)
+        iterations = method.iterations
+        if method.name == "conjugate gradients":
+            iterations = self._conjugate_gradients().iterations_run()
+        norm, norm_b, norm_x = (self.inner.norm(f) for f in (self.residual, b, x))
+        return Residual(method.name, iterations, norm, norm_b, norm_a * norm_x)

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.walls import Rule
-from wfluid.fields.arrays import Vector, field, upload
+from wfluid.fields.arrays import Vector, field, upload, upload_rows
 from wfluid.fields.ghosts import ghost_table
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
 from wfluid.kernels.cell.strips import together
@@ -26,17 +26,20 @@ class Transfer:
         self.fine, self.coarse = fine, coarse
 
     def restrict(self, r: Vector, out: Vector) -> None:
-        """out = the transpose of the prolongation times the ratio of the cells' areas, applied to r."""
+        """out = R r: R is the transpose of prolongation times the ratio of the two cell areas.
+
+        Fills the ghosts of out.
+        """
         with together():
             for component, f in zip(self.components, r, strict=True):
                 component.down.along_y(f)
         with together():
-            for component, to in zip(self.components, out, strict=True):
-                component.down.along_x(to)
+            for component, f in zip(self.components, out, strict=True):
+                component.down.along_x(f)
         self.coarse.fill(out)
 
     def prolong_add(self, x: Vector, e: Vector, out: Vector) -> None:
-        """out = x + the interpolated e; e with ghosts."""
+        """out = x + e interpolated to the fine grid. Reads the ghosts of e, fills those of out."""
         with together():
             for component, correction in zip(self.components, e, strict=True):
                 component.along_x(correction)
@@ -61,18 +64,18 @@ class _Interpolation:
         self.up_x, self.up_y = (_padded(axis[0] + HALO, axis[1], device) for axis in (x, y))
 
     def along_x(self, e: wp.array) -> None:
-        """Interpolate rows to the fine grid's columns."""
+        """Interpolate e along its rows to the columns of the fine grid."""
         inputs, rows = [e, *self.up_x, self.coarse.pitch], (-1, self.coarse.ny + 1)
         transfer.prolong_x.launch(self.down.strip, self.device, inputs, [self.down.between], rows=rows)
 
     def add_along_y(self, x: wp.array, out: wp.array) -> None:
-        """out = x + what `along_x` made, interpolated to the fine grid's rows."""
+        """out = x + the result of `along_x`, interpolated to the rows of the fine grid."""
         inputs = [x, self.down.between, *self.up_y, self.down.strip.pitch]
         transfer.prolong_y_add.launch(self.fine, self.device, inputs, [out])
 
 
 class WeightedSums:
-    """Sums of at most 4 x 4 points of a fine grid with weights, for each point of a coarse one."""
+    """For each point of a coarse grid, the weighted sum of at most 4 x 4 points of a fine grid."""
 
     def __init__(self, fine: Layout, coarse: Layout, x: list[dict], y: list[dict], device: wp.Device):
         self.fine, self.coarse, self.device = fine, coarse, device
@@ -81,22 +84,25 @@ class WeightedSums:
         self._x, self._y = _tables(x, device), _tables(y, device)
 
     def along_y(self, f: wp.array) -> None:
-        """Sum rows."""
+        """Sum f over rows, with the weights along y."""
         inputs = [f, *self._y, self.fine.pitch]
         transfer.restrict_y.launch(self.strip, self.device, inputs, [self.between])
 
     def along_x(self, out: wp.array) -> None:
-        """out = the sums over columns of what `along_y` made, without ghosts."""
+        """out = the result of `along_y` summed over columns, with the weights along x.
+
+        Does not fill the ghosts of out.
+        """
         inputs = [self.between, *self._x, self.strip.pitch]
         transfer.restrict_x.launch(self.coarse, self.device, inputs, [out])
 
 
 class Averaging:
-    """Means of a coefficient on the next coarser grid: over the area that a coarse point stands for.
+    """Means of a coefficient over the area of each point of the next coarser grid.
 
-    Along an axis on whose faces it lies, that is weighted like a hat, as the correction is interpolated:
-    the coarse operator then has the fine one's energy, which plain means of faces overestimate by any
-    factor where the coefficient jumps.
+    Along an axis on whose faces the coefficient is given, the mean has the weights of a hat function, as the
+    interpolation of the correction has. The coarse operator then has the energy of the fine one; plain means
+    of faces overestimate it by any factor where the coefficient jumps.
     """
 
     def __init__(
@@ -116,7 +122,7 @@ class Averaging:
         self._collection = WeightedSums(fine, coarse, x, y, device)
 
     def average(self, f: wp.array, out: wp.array) -> None:
-        """out = the means of f, without ghosts."""
+        """out = the means of f. Does not fill the ghosts of out."""
         self._collection.along_y(f)
         self._collection.along_x(out)
 
@@ -124,8 +130,8 @@ class Averaging:
 def _interpolation(n: int, m: int, rule: Rule, on_faces: bool):
     """Linear interpolation from m coarse points of an axis to n fine ones.
 
-    Returns for each fine point the coarse point before it (from -1), the fraction past it, and the
-    coarse axis's ghost table.
+    Returns for each fine point the coarse point before it (from -1) and the fraction past that point; and the
+    ghost table of the coarse axis.
     """
     i = np.arange(n)
     position = i * (m / n) if on_faces else (i + 0.5) * (m / n) - 0.5
@@ -134,9 +140,10 @@ def _interpolation(n: int, m: int, rule: Rule, on_faces: bool):
 
 
 def _transposed(before: np.ndarray, fraction: np.ndarray, ghosts) -> list[dict[int, float]]:
-    """The transpose of an interpolation, ghosts folded in, times the ratio of point counts.
+    """The transpose of an interpolation, times the ratio of point counts m / n.
 
-    For each coarse point the fine points that it collects, with their weights.
+    Returns for each coarse point the weights of the fine points, by their index. Weights of ghosts are added
+    to those of the points that the ghosts copy.
     """
     source, sign = ghosts
     m, n = len(source) - 2 * HALO, len(before)
@@ -151,7 +158,7 @@ def _transposed(before: np.ndarray, fraction: np.ndarray, ghosts) -> list[dict[i
 
 
 def _means(n: int, m: int) -> list[dict[int, float]]:
-    """For each of m cells the cells of n over the same length that it covers, with their parts of it."""
+    """For each of m coarse cells on an axis, the part of it that each of n fine cells covers, by index."""
     edges = np.arange(m + 1) * (n / m)
     covered = []
     for start, end in pairwise(edges):
@@ -161,7 +168,7 @@ def _means(n: int, m: int) -> list[dict[int, float]]:
 
 
 def _hats(n: int, m: int, periodic: bool) -> list[dict[int, float]]:
-    """For each of m faces the faces of n around it, with the parts that sum to one of a hat."""
+    """For each of m coarse faces, the weights of n fine faces under its hat function, by index; sum 1."""
     weights = np.zeros((m, n))
     for c in range(m):
         distance = np.abs(np.arange(n) * (m / n) - c)
@@ -173,20 +180,17 @@ def _hats(n: int, m: int, periodic: bool) -> list[dict[int, float]]:
 
 
 def _tables(collected: list[dict[int, float]], device: wp.Device):
-    """Four tables of points (counted with the halo) that a coarse point collects, and four of weights."""
+    """Tables over coarse points: four of fine points, as indices with the halo, and four of their weights."""
     room = whole_spans(len(collected))
     points, weights = np.full((4, room), HALO), np.zeros((4, room))
     for c, terms in enumerate(collected):
         for slot, (i, weight) in enumerate(terms.items()):
             points[slot, c], weights[slot, c] = i + HALO, weight
-    return (
-        *(upload(row, device, wp.int32) for row in points),
-        *(upload(row, device) for row in weights),
-    )
+    return *upload_rows(points, device, wp.int32), *upload_rows(weights, device)
 
 
 def _padded(before: np.ndarray, fraction: np.ndarray, device: wp.Device):
-    """An axis's interpolation tables, padded to whole spans."""
+    """Interpolation tables of an axis, padded to full spans."""
     room = whole_spans(len(before)) - len(before)
     return (
         upload(np.pad(before, (0, room), constant_values=HALO), device, wp.int32),

@@ -232,7 +232,7 @@ class CoupledDiffusion:
                 algebra.multiply.launch(self.layout, self.device, [f, beta], [to])
         top.fill(dragged)
         top.residual(velocity, dragged, self._b)
-        self.system.solve(self.method, self._b, self._x, velocity)
+        self.system.solve(self.method, self._b, self._x, scale=velocity)
         with together():
             for f, change, out in zip(dragged, self._x, self.out, strict=True):
                 algebra.add_scaled.launch(self.layout, self.device, [f, change, self._numbers.one], [out])
@@ -256,7 +256,7 @@ class CoupledDiffusion:
         Returns lambda = M out_bar, with ghosts, arrays that the next solve overwrites.
         """
         beta, residual, scaled, lambda_ = self.coefficients.levels[0].beta, self._b, self._scaled, self._x
-        self.system.solve(self.method, out_bar, lambda_, out_bar)
+        self.system.solve(self.method, out_bar, lambda_, scale=out_bar)
         self._levels[0].residual(out_bar, lambda_, residual)
         with together():
             for f, b, to in zip(residual, beta, scaled, strict=True):

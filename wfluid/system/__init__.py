@@ -1,1 +1,1 @@
-"""What the machine gives: files that appear whole, memory, threads, interrupts."""
+"""The operating system: atomic files, memory, threads, interrupts, stderr."""

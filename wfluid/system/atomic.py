@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all."""
+"""Atomic writing: files appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ NAME_LIMIT = 255
 """Longest name of a file on common file systems [bytes]."""
 
 HOST_LIMIT = 64
-"""Bytes of the host's name that a temporary name holds."""
+"""Largest part of the host's name in a temporary name [bytes]."""
 
 
 @contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """A temporary file in the same folder, renamed to `path` on success and removed on failure.
+    """The path of a temporary file in the same folder, renamed to `path` on success and removed on failure.
 
-    Temporary files of `path` that killed processes of this host have left are removed first.
+    First, temporary files of `path` that killed processes of this host left behind are removed.
     """
     remove_leftovers(path)
     process = os.getpid()
@@ -36,7 +36,7 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 
 def atomic_write_text(path: Path, text: str) -> None:
-    """Write a text, whole or not at all.
+    """Write a text in UTF-8, completely or not at all.
 
     Raises:
         FileError: the file cannot be written.
@@ -51,12 +51,12 @@ def atomic_write_text(path: Path, text: str) -> None:
 def remove_leftovers(path: Path) -> None:
     """Remove the temporary files of `path` whose process ran on this host and is gone."""
     if os.name != "posix":
-        return  # whether a process runs cannot be asked there
+        return  # other systems cannot tell whether a process runs
     name = re.compile(re.escape(_prefix(path)) + r"(\d+)-(\d+)\.part" + re.escape(path.suffix))
     try:
         found = [name.fullmatch(entry) for entry in os.listdir(path.parent)]
     except OSError:
-        return  # no such folder, or one that may not be listed
+        return  # the folder does not exist or cannot be listed
     for leftover in filter(None, found):
         process, start = leftover.groups()
         if not _alive(int(process), start):
@@ -64,13 +64,13 @@ def remove_leftovers(path: Path) -> None:
 
 
 def _prefix(path: Path) -> str:
-    """What the temporary names of a file on this host begin with: `.STEM.wfluid-HOST-`.
+    """The prefix of temporary names of a file on this host: `.STEM.wfluid-HOST-`.
 
-    A stem that leaves no room for the rest is cut, and told from others by a hash of it.
+    A stem that is too long is cut, and a hash of the full stem is appended.
     """
     host = re.sub(r"[^\w.-]", "_", platform.node()).encode()[-HOST_LIMIT:].decode(errors="ignore")
     rest = f".wfluid-{host}-"
-    numbers = len("4194304-00000000000000000000.part")  # the longest numbers of process and start
+    numbers = len("4194304-00000000000000000000.part")  # the longest process number and start
     room = NAME_LIMIT - 1 - len(rest.encode()) - numbers - len(os.fsencode(path.suffix))
     stem = path.stem
     if len(os.fsencode(stem)) > room:
@@ -80,16 +80,16 @@ def _prefix(path: Path) -> str:
 
 
 def _started(process: int) -> str:
-    """When a process started [clock ticks since the system's start]; "0" where that is not known."""
+    """Start of a process [clock ticks since the system's start]; "0" if unknown."""
     try:
-        after_its_name = Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2]
+        after_name = Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2]
     except OSError:
         return "0"
-    return after_its_name.split()[19].decode()  # field 22 of proc(5)
+    return after_name.split()[19].decode()  # field 22 of proc(5)
 
 
 def _alive(process: int, start: str) -> bool:
-    """Whether a process with this start still runs: its number may have gone to another since."""
+    """Whether the process with this number and start still runs; numbers are reused."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

@@ -1,4 +1,4 @@
-"""Ctrl-C, heeded where work can stop: between frames, or between iterations of an optimiser."""
+"""Deferred Ctrl-C: work stops between frames, or between iterations of an optimiser."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from types import FrameType, TracebackType
 
 
 class HeldInterrupt:
-    """Holds a Ctrl-C back until `check` is asked; a second one stops at once.
+    """A context that defers Ctrl-C to the next call of `check`; a second Ctrl-C stops at once.
 
     >>> with HeldInterrupt() as interrupt:
     ...     for frame in range(3):
     ...         interrupt.check()
 
-    Python raises KeyboardInterrupt wherever it is, and forgets it where that is a destructor, of which there
-    are many while arrays of the device come and go; or it leaves a library half way. Only the main thread is
-    told of signals: in others nothing is held.
+    Python raises KeyboardInterrupt at any instruction. In a destructor, such as that of a device array, the
+    exception is lost; in a library it may leave an inconsistent state. Only the main thread receives signals:
+    in other threads the context does nothing.
     """
 
     def __init__(self) -> None:
         self.wanted = False
 
     wanted: bool
-    """Whether somebody has asked to stop."""
+    """Whether Ctrl-C was pressed."""
 
     def __enter__(self) -> HeldInterrupt:
         self._held = threading.current_thread() is threading.main_thread()
@@ -37,10 +37,10 @@ class HeldInterrupt:
         self.wanted = True
 
     def check(self) -> None:
-        """Stop here, if that is wanted.
+        """Stop here if Ctrl-C was pressed.
 
         Raises:
-            KeyboardInterrupt: it is.
+            KeyboardInterrupt: Ctrl-C was pressed.
         """
         if self.wanted:
             raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Memory that is free, and sizes as people read them."""
+"""Free memory, and sizes in readable units."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def free_memory() -> int:
-    """Bytes of memory that a program may take now, as well as the system says."""
+    """Memory available to a program [bytes]; the total memory, or 8 GiB, if the system does not tell."""
     try:
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
@@ -20,7 +20,7 @@ def free_memory() -> int:
 
 
 def readable_size(size: float) -> str:
-    """Bytes for people: "3.2 GB"."""
+    """A size in bytes with a readable unit, such as "3.2 GB"."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000:
             return f"{size:.3g} {unit}"

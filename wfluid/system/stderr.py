@@ -1,4 +1,4 @@
-"""What native libraries print is kept off stderr."""
+"""Suppression of messages that native libraries write to stderr."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _STDERR = threading.RLock()
 
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """Drop what native code writes to stderr; Python's own messages come as exceptions."""
-    with _STDERR:  # one thread at a time, or one would keep another's silence
+    """A context that drops what native code writes to stderr."""
+    with _STDERR:  # one thread at a time: another would restore the null device instead of stderr
         if sys.stderr is not None:
             sys.stderr.flush()
         try:
             kept = os.dup(2)
-        except OSError:  # there is no stderr to keep quiet
+        except OSError:  # there is no stderr
             yield
             return
         try:

@@ -1,4 +1,4 @@
-"""The map of one frame: for every place, where in the source picture its colour comes from."""
+"""The backward map of one frame: for every place, its source in the picture."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from wfluid.kernels.cell.layout import HALO
 
 @dataclass(frozen=True)
 class CoordinateMap:
-    """A backward map (`source_of`) on the cells' centres of a grid."""
+    """A backward map at the centres of a grid's cells; `source_of` and `source_at` evaluate it."""
 
     grid: Grid
-    """The grid it was computed on."""
+    """Grid of the map."""
     walls: Walls
-    """The walls it was computed between: how it continues beyond the edges."""
+    """Boundary conditions, which determine the map beyond the edges."""
     displacement: np.ndarray
     """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
 
@@ -32,16 +32,16 @@ class CoordinateMap:
 
     @property
     def source_of(self) -> np.ndarray:
-        """Place in the source seen at each centre [longer side], (ny, nx, 2), x then y."""
+        """Source of each centre [longer side], (ny, nx, 2), x then y."""
         grid = self.grid
         x = (np.arange(grid.nx) + 0.5) * grid.hx
         y = (np.arange(grid.ny) + 0.5) * grid.hy
         return self.displacement + np.stack(np.meshgrid(x, y), axis=2)
 
     def source_at(self, places: np.ndarray) -> np.ndarray:
-        """Place in the source seen at any places (n, 2) [longer side], (n, 2), x then y.
+        """Sources of any places (n, 2) [longer side]: (n, 2), x then y.
 
-        By Catmull-Rom interpolation of the displacement, as pictures are looked up.
+        Computed by Catmull-Rom interpolation of the displacement, like look-ups of pictures.
         """
         grid, places = self.grid, np.asarray(places, dtype=np.float64)
         spacing = np.array([grid.hx, grid.hy])

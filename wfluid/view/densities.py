@@ -17,7 +17,10 @@ DARKEST = 1e-3
 def upsample(
     values: np.ndarray, width: int, height: int, periodic: tuple[bool, bool] = (False, False)
 ) -> np.ndarray:
-    """Values (ny, nx) at cells' centres as (height, width): cubic B-splines, within their range."""
+    """Values at centres (ny, nx), interpolated to pixels (height, width) by cubic B-splines.
+
+    The result stays within the range of the values.
+    """
     rows, columns = values.shape
     down, across = _splines(rows, height, periodic[1]), _splines(columns, width, periodic[0])
     return down @ values.astype(np.float32) @ across.T

@@ -35,9 +35,10 @@ QUAD = 4
 
 
 class PictureOnDevice:
-    """A picture's channels in device memory, four at a time, ready to be looked up in.
+    """A picture's channels in device memory, four to an array.
 
-    With the transparent edge a picture without alpha gains one, so that what lies outside shows.
+    With `transparent`, a picture without alpha gets an opaque alpha channel, so that places outside are
+    transparent.
     """
 
     def __init__(self, picture: Picture, transparent: bool, device: wp.Device):
@@ -51,18 +52,18 @@ class PictureOnDevice:
 
 
 def quads_of(pixels: np.ndarray) -> list[np.ndarray]:
-    """Pixels (height, width, channels), four channels at a time; what the last lack is 0."""
+    """Pixels (height, width, channels) as arrays of four channels; the last one is padded with 0."""
     padded = np.pad(pixels, ((0, 0), (0, 0), (0, -pixels.shape[2] % QUAD)))
     firsts = range(0, padded.shape[2], QUAD)
     return [np.ascontiguousarray(padded[..., first : first + QUAD]) for first in firsts]
 
 
 class LookUp:
-    """Renders a picture through displacements on a fluid's grid, at a size of its own.
+    """Renders a picture through displacements on a fluid's grid, at any size.
 
-    `edge` holds for axes between walls; a periodic axis always wraps. On a CPU the rows are shared
-    between its cores. `stretch`, `place` and `read`, in this order, only launch, so that a graph of
-    another's may capture them.
+    `edge` applies to axes between walls; a periodic axis always wraps. On a CPU the cores share the rows.
+    `stretch`, `place` and `read`, in this order, contain launches only, so that other graphs can capture
+    them.
     """
 
     def __init__(
@@ -98,21 +99,21 @@ class LookUp:
         self._replay: CapturedGraph | None = None
 
     source: PictureOnDevice
-    """What is looked up in."""
+    """The source picture."""
     edges: list[int]
-    """What lies beyond its edges along x and y, as `EDGES` numbers it."""
+    """Index in `EDGES` of the edge along x and y."""
     slopes: tuple[float, float]
-    """Pixels of the source along x and y that a cell is long."""
+    """Size of a cell along x and y [px of the source]."""
     strip: Layout
-    """Of displacements in rows of pixels and columns of cells."""
+    """Layout of displacements in rows of pixels and columns of cells."""
     layout: Layout
-    """Of the pixels that are shown."""
+    """Layout of the rendered pixels."""
     stretched: Vector
-    """Displacements in rows of pixels and columns of cells, with ghosts: what `stretch` finds."""
+    """Displacements in rows of pixels and columns of cells, with ghosts; the result of `stretch`."""
     coordinates: Vector
-    """Where each pixel's colour comes from, along x and y [px of the source]: what `place` finds."""
+    """Source of each pixel along x and y [px of the source]; the result of `place`."""
     shown: list[wp.array]
-    """The pixels that `read` finds, four channels each."""
+    """Rendered pixels, four channels in each array; the result of `read`."""
 
     def stretch(self, d_x: wp.array, d_y: wp.array) -> None:
         """Interpolate displacements [cells], fields with ghosts, to rows of pixels; launches only."""
@@ -125,7 +126,7 @@ class LookUp:
                 ghosts.fill(out)
 
     def place(self) -> None:
-        """Find where each pixel's colour comes from; launches only."""
+        """Compute the source of each pixel; launches only."""
         sizes = ((self.source.width, self.width), (self.source.height, self.height))
         with together():
             for axis, (pixels, outputs) in enumerate(sizes):
@@ -135,7 +136,7 @@ class LookUp:
                 lookup.stretch_x.launch(self.layout, self.device, inputs, [self.coordinates[axis]])
 
     def read(self) -> None:
-        """Read every pixel at its place; launches only."""
+        """Interpolate the picture at the source of each pixel; launches only."""
         source = self.source
         with together():
             for quad, out in zip(source.quads, self.shown, strict=True):
@@ -143,7 +144,7 @@ class LookUp:
                 self._program.launch(self.layout, self.device, inputs, [out])
 
     def launch(self, d_x: wp.array, d_y: wp.array) -> None:
-        """Compute the coordinates and pixels of `render`, left in device memory."""
+        """Compute the coordinates and pixels of `render` in device memory."""
         self.stretch(d_x, d_y)
         if self._replay is None:
             threads = 1 if self.device.is_cuda else min(free_cores(), LOOKUP_THREADS)
@@ -160,7 +161,7 @@ class LookUp:
 
     @property
     def untouched(self) -> Picture:
-        """What a still map shows, to the bit; with the transparent edge it has its alpha."""
+        """The picture under the identity map, without rounding; alpha is added for the transparent edge."""
         pixels, alpha = self.picture.pixels, self.picture.alpha
         if (self.width, self.height) != (self.picture.width, self.picture.height):
             still = self._still
@@ -170,9 +171,9 @@ class LookUp:
         return replace(self.picture, pixels=np.array(pixels), alpha=self.source.alpha)
 
     def source_of(self, d_x: wp.array, d_y: wp.array) -> np.ndarray:
-        """Where each pixel's colour comes from: (height, width, 2), x and y [px of the source].
+        """Source of each pixel: (height, width, 2), x and y [px of the source].
 
-        Counted from the centre of the source's first pixel.
+        The origin is the centre of the source's first pixel.
         """
         self.launch(d_x, d_y)
         return np.stack([interior(read(f), self.layout) for f in self.coordinates], axis=2)
@@ -183,9 +184,10 @@ class LookUp:
 
 
 def cubic_weights(cells: int, pixels: int) -> tuple[np.ndarray, np.ndarray]:
-    """Catmull-Rom interpolation from `cells` centres to `pixels` centres of one axis, padded to whole spans.
+    """Catmull-Rom interpolation from `cells` to `pixels` centres of one axis, padded to complete spans.
 
-    The centre before each pixel, -1 … cells - 1, and the weights (4, …) of four centres, it being the second.
+    Returns the index of the centre before each pixel, -1 … cells - 1, and the weights (4, …) of four centres,
+    of which that is the second.
     """
     position = (np.arange(whole_spans(pixels)) + 0.5) * (cells / pixels) - 0.5
     position = np.minimum(position, cells - 0.5)  # the padding of the last span reads inside

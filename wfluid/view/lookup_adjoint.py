@@ -20,14 +20,15 @@ ADJOINTS = {
     "bilinear": lookup_adjoint.look_up_adjoint_bilinear,
     "cubic": lookup_adjoint.look_up_adjoint_cubic,
 }
-"""Of the filters that have one."""
+"""Adjoint programs of filters; the other filters have none."""
 
 
 class LookUpAdjoint:
-    """The transposes of a look-up's launches, about what it has just seen.
+    """The transposed launches of a look-up, linearised about its last evaluation.
 
-    `begin`, `read` for every four channels, `place` and `stretch`, in this order, only launch. x_bar stands
-    for the gradient of an objective with respect to x; those with respect to ghosts are folded into cells.
+    `begin`, `read` for every four channels, `place` and `stretch`, in this order, contain launches only.
+    x_bar is the gradient of an objective with respect to x. Gradients with respect to ghosts are added to
+    cells.
 
     Raises:
         KeyError: a filter without an adjoint.
@@ -43,12 +44,12 @@ class LookUpAdjoint:
         self.stretched_bar = vector(look_up.strip, device, 2)
 
     coordinates_bar: tuple[wp.array, ...]
-    """With respect to `LookUp.coordinates` [1/px of the source]: `read` adds to it."""
+    """Gradient with respect to `LookUp.coordinates` [1/px of the source]; `read` adds to it."""
     stretched_bar: tuple[wp.array, ...]
-    """With respect to displacements in rows of pixels and columns of cells, without ghosts."""
+    """Gradient with respect to displacements in rows of pixels and columns of cells, without ghosts."""
 
     def begin(self) -> None:
-        """Forget what was read before."""
+        """Set `coordinates_bar` to 0."""
         alone(lambda: fill(0.0, *self.coordinates_bar))
 
     def read(self, quad: int, shown_bar: wp.array) -> None:
@@ -60,7 +61,7 @@ class LookUpAdjoint:
         )
 
     def place(self) -> None:
-        """Find `stretched_bar`, from `coordinates_bar`."""
+        """Compute `stretched_bar` from `coordinates_bar`."""
         look_up = self._look_up
         axes = zip(self.coordinates_bar, self._columns, look_up.slopes, self.stretched_bar, strict=True)
         with together():
@@ -81,10 +82,10 @@ class LookUpAdjoint:
 
 
 def transposed(cells: int, pixels: int, rule: Rule, device: wp.Device) -> list[wp.array]:
-    """The transpose of the interpolation from cells to pixels of one axis, ghosts folded by a wall's rule.
+    """The transposed interpolation from cells to pixels of one axis, with ghosts replaced by a wall's rule.
 
-    Where the entries of each cell begin, and of the next, padded to whole spans of cells without any; then
-    the entries: pixels that read the cell, in their order, and with which weight.
+    A sparse matrix by rows: the index of the first entry of each cell, padded to complete spans; and the
+    pixel and the weight of each entry, ordered by pixels within a cell.
     """
     before, weights = cubic_weights(cells, pixels)
     source, sign = ghost_table(cells, rule)

@@ -14,12 +14,12 @@ from wfluid.view.coordinate_map import CoordinateMap
 
 @dataclass(frozen=True)
 class MapQuality:
-    """How a map changes the picture: folds, areas, distances."""
+    """Measures of a backward map: change of area, displacement, sources outside the picture."""
 
     jacobian_min: float
-    """Least det of the map's Jacobian over the cells; 0 or less is a fold."""
+    """Least determinant of the map's Jacobian over the cells; a fold if it is at most 0."""
     jacobian_max: float
-    """Greatest det of the map's Jacobian."""
+    """Greatest determinant of the map's Jacobian."""
     displacement_max: float
     """Longest displacement [longer side]."""
     displacement_mean: float
@@ -29,7 +29,7 @@ class MapQuality:
 
 
 def measure_map(state: State, warp: CoordinateMap) -> MapQuality:
-    """The measures of a state's map; `warp` is the host's copy of that map (`CoordinateMap.of_state`)."""
+    """The measures of a state's map; `warp` is its copy on the host (`CoordinateMap.of_state`)."""
     layout, device, grid = state.layout, state.u.device, state.grid
     least, greatest, outside = (zeros(layout.ny, device) for _ in range(3))
     closed = [int(not periodic) for periodic in warp.walls.periodic]
