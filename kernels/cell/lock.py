@@ -5,6 +5,7 @@ A capture records all launches, allocations, copies and writes, of every thread.
 capture from its beginning to its end (`wfluid/fields/graph`). Replays need no lock.
 """
 
+import os
 import threading
 from collections.abc import Callable
 from functools import wraps
@@ -12,6 +13,11 @@ from typing import ParamSpec, TypeVar
 
 LAUNCHES = threading.RLock()
 """Held while Warp launches, allocates, copies, or captures."""
+
+if hasattr(os, "register_at_fork"):  # else a child inherits the lock as held by a thread that it lacks
+    os.register_at_fork(
+        before=LAUNCHES.acquire, after_in_parent=LAUNCHES.release, after_in_child=LAUNCHES.release
+    )
 
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")

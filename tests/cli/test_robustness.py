@@ -186,6 +186,15 @@ def test_the_output_may_not_be_the_input(small):
     assert small.read_bytes() == before and not small.with_name("b.gif").exists()
 
 
+def test_the_output_may_not_be_the_file_of_points(small, tmp_path):
+    points = tmp_path / "points.csv"
+    points.write_text("30,20,32,20\n")
+    flags = ("--points", points, "--track", "10,10", "--tracks", points, "--cells", "16", "--quiet")
+    result = wfluid("keyframes", small, "-o", tmp_path / "a.gif", *flags)
+    assert result.returncode == 2 and "the file of points" in result.stderr, result.stderr
+    assert points.read_text() == "30,20,32,20\n"
+
+
 def test_a_sequence_may_not_hold_the_input_nor_two_outputs_one_name(small, tmp_path):
     shot = tmp_path / "shot.1002.png"
     shot.write_bytes(small.read_bytes())

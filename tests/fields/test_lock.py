@@ -1,5 +1,7 @@
 """What one thread does on the device while another captures a graph stays out of the capture."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -88,3 +90,23 @@ def test_a_capture_takes_in_nothing_of_another_thread(device, work):
         graph.launch()
     for one, other_one in zip(expected, found, strict=True):
         np.testing.assert_array_equal(one, other_one)
+
+
+def test_a_process_forked_while_a_thread_computes_does_not_wait_for_it():
+    """The child has no such thread, so it must not inherit the lock as held."""
+    code = (
+        "import os, threading, time\n"
+        "from wfluid.kernels.cell.lock import LAUNCHES\n"
+        "held = threading.Event()\n"
+        "def work():\n"
+        "    with LAUNCHES:\n"
+        "        held.set(); time.sleep(0.5)\n"
+        "threading.Thread(target=work).start()\n"
+        "held.wait()\n"
+        "child = os.fork()\n"
+        "if child == 0:\n"
+        "    os._exit(0 if LAUNCHES.acquire(timeout=5) else 1)\n"
+        "print(os.waitpid(child, 0)[1])\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert result.stdout.strip() == "0", result.stderr

@@ -171,3 +171,12 @@ def test_a_morph_has_no_flags_that_it_has_no_use_for():
     reasons = [reason for _, _, table in tables() for reason in table.not_in_morph.values()]
     assert set(SCENE.not_in_morph) == {"effect", "force", "group", "density", "layer", "tracks"}
     assert len(reasons) == 10 and all(reason.startswith("not allowed in a morph: ") for reason in reasons)
+
+
+def test_a_scene_equals_another_of_the_same_tables_and_stays_as_it_is():
+    assert Scene(TABLES) == Scene(TABLES) != Scene({**TABLES, "fluid": {"cells": 33}})
+    table = Scene(TABLES).fluid
+    for change in (lambda: setattr(table, "cells", 64), lambda: delattr(table, "cells")):
+        with pytest.raises(AttributeError, match=r"FluidTable.cells cannot be"):
+            change()
+    assert table.cells == 32

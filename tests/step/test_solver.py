@@ -11,7 +11,8 @@ from wfluid.domain.envelopes import Constant, Instantaneous
 from wfluid.domain.grid import Grid
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
-from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.model.gaussian_forces import GaussianForce, Growth
+from wfluid.model.painted import Painted
 from wfluid.step.solver import Solver
 
 WALLS = ("free-slip", "no-slip", "periodic", "periodic,no-slip", "free-slip,periodic")
@@ -330,3 +331,30 @@ def test_cuda_gives_the_cpus_results(walls):
         results.append(state.velocity + state.displacement)
     for cpu, cuda in zip(*results, strict=True):
         np.testing.assert_allclose(cuda, cpu, atol=2e-5)
+
+
+def test_runs_that_take_turns_on_a_solver_compute_what_each_computes_alone(make_solver):
+    """A step subtracts the last pressure of its own run, not that of the solver's last step."""
+    paint = Painted(np.linspace(0.0, 1.0, 24)[None, :] * np.ones((16, 1)), scale=0.02, floor=1e-3)
+    forces = [
+        GaussianForce((0.4, 0.3), (1.5, 0.5), 0.1),
+        Growth((0.6, 0.3), rate=2.0, radius=0.1, envelope=Constant(0.0, 0.2)),
+    ]
+    solver = make_solver(24, 16, viscosity=paint)
+
+    def run(states, steps):
+        """From step to step, to and fro between two states."""
+        for n in steps:
+            solver.step(*(states if n % 2 == 0 else states[::-1]), forces, n * 0.05, 0.05)
+        return states[(steps.stop) % 2].displacement
+
+    def fresh():
+        return solver.rest(), solver.rest()
+
+    alone = run(fresh(), range(8))
+    early, late = fresh(), fresh()
+    run(early, range(5))  # beyond the growth
+    for n in range(8):
+        mine = run(late, range(n, n + 1))
+        run(early, range(5 + n, 6 + n))
+    np.testing.assert_array_equal(mine, alone)

@@ -28,6 +28,8 @@ class RunOptions:
     """File to save the scene to; the run continues if the scene has outputs."""
     plot: str | None = None
     """File for a figure of the search for keyframes."""
+    points: str | None = None
+    """File that the moves were read from."""
 
 
 def check_run(scene: Scene, options: RunOptions) -> None:
@@ -64,6 +66,8 @@ def _check_names(scene: Scene, options: RunOptions) -> None:
     taken = {path.resolve(): "an input of the scene" for path in scene.files()}
     taken[(scene.folder / scene.picture.file).resolve()] = "the picture itself"
     taken[Path(scene.source).resolve()] = "the scene itself"
+    if options.points:
+        taken[Path(options.points).resolve()] = "the file of points"
     written = [
         (scene.folder / output.file, f"the output of {output.of!r}", output.start) for output in scene.outputs
     ]

@@ -66,5 +66,6 @@ def _run(scene: Scene, options: argparse.Namespace) -> int:
         preview=options.preview,
         save_scene=getattr(options, "save_scene", None),
         plot=getattr(options, "plot", None),
+        points=getattr(options, "points", None),
     )
     return run_scene(scene, run)

@@ -23,10 +23,10 @@ def open_device(name: str | None = None) -> wp.Device:
         DeviceError: the machine has no such device; the message lists its devices.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
-    with quiet_stderr():
-        wp.init()
     try:
-        return wp.get_device(name or "cpu")
+        with quiet_stderr():  # the driver's complaints, where there is none
+            wp.init()
+            return wp.get_device(name or "cpu")
     except (ValueError, RuntimeError) as error:
         aliases = ", ".join(device.alias for device in wp.get_devices())
         raise DeviceError(f"device {name!r} is not available here; there is: {aliases}") from error

@@ -19,7 +19,7 @@ PARTICLES = ("p_x", "p_y")
 """Names of the arrays with one entry per point of the picture."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """Velocity, displacement, pressure and densities over one `Layout`, with ghosts; and points."""
 

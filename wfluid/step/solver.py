@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
@@ -49,7 +51,9 @@ class Solver:
     The constructor loads the kernels. For each pair of states, the first step from one to the other is
     captured as a graph, which later steps replay: they read the step's length and the forces' numbers from
     device memory. On a CPU with free cores two threads share the rows of every stage; the results have the
-    same bits as with one. One thread at a time may use a solver; other threads may use solvers of their own.
+    same bits as with one. Several runs may take steps in turn, in threads of their own too: a step waits for
+    the one before it, and takes what it needs of a run's last step from the state. A `report` is of the last
+    step of all.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
@@ -57,7 +61,9 @@ class Solver:
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
         self._step = Step(grid, fluid, device)
-        self._last_dt, self._prescribed = 0.0, 0.0
+        self._last_step, self._prescribed = (0.0, 0.0), 0.0
+        self._written: WeakKeyDictionary[State, tuple[float, float]] = WeakKeyDictionary()
+        self._stepping = threading.Lock()
         self._preparation: CapturedGraph | None = None
         self._forcings: dict[tuple, Forcing] = {}
         self._last_forcing: Forcing | None = None
@@ -126,7 +132,8 @@ class Solver:
             raise ValueError("a step cannot write the state it reads")
         self._check(state_in, state_out)
         until = t + dt if until is None else until
-        self._graph_for(state_in, state_out, flatten(forces), t, dt, until).launch()
+        with self._stepping:
+            self._graph_for(state_in, state_out, flatten(forces), t, dt, until).launch()
 
     def _graph_for(
         self,
@@ -139,9 +146,11 @@ class Solver:
     ) -> CapturedGraph:
         """The captured step, its numbers uploaded to device memory."""
         step, forcing = self._step, self._forcing_for(forces)
-        pressure_part = step.pressure_part(dt, self._last_dt, self._prescribed > 0)
+        last_dt, last_prescribed = self._written.get(state_in, self._last_step)
+        pressure_part = step.pressure_part(dt, last_dt, last_prescribed > 0)
         self._prescribed = forcing.set(forces, self.fluid, t, dt, until, pressure_part)
-        self._last_forcing, self._last_dt = forcing, dt
+        self._last_forcing, self._last_step = forcing, (dt, self._prescribed)
+        self._written[state_out] = self._last_step
         plan = step.plan(until, dt, self._prepare)
         key = (id(state_in), id(state_out), id(forcing), plan)
         if key not in self._replays:
