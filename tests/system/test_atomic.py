@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -17,8 +18,8 @@ from pathlib import Path
 from wfluid.system.atomic import atomic_file
 if len(sys.argv) > 2:
     platform.node = lambda: sys.argv[2]
-with atomic_file(Path(sys.argv[1])) as temporary:
-    temporary.write_bytes(b"x")
+with atomic_file(Path(sys.argv[1])) as file:
+    file.write(b"x")
     os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -32,9 +33,9 @@ def killed_while_writing(path, *host):
 
 
 def write(path):
-    with atomic_file(path) as temporary:
-        temporary.write_bytes(b"y")
-        return temporary.name
+    with atomic_file(path) as file:
+        file.write(b"y")
+        return Path(file.name).name
 
 
 def test_a_writer_removes_what_a_killed_process_left_of_its_file(tmp_path):
@@ -79,10 +80,10 @@ def test_a_check_removes_nothing(tmp_path):
 
 
 def test_a_living_process_keeps_its_file(tmp_path):
-    with atomic_file(tmp_path / "a.png") as temporary:
-        temporary.write_bytes(b"x")
+    with atomic_file(tmp_path / "a.png") as file:
+        file.write(b"x")
         subprocess.run([sys.executable, "-c", KILLED.replace("os.kill", "0 and os.kill"), tmp_path / "a.png"])
-        assert (tmp_path / "a.png").read_bytes() == b"x" and temporary.exists()
+        assert (tmp_path / "a.png").read_bytes() == b"x" and Path(file.name).exists()
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
@@ -113,7 +114,7 @@ def test_the_longest_names_can_be_written(tmp_path, monkeypatch, letter):
 
 def test_a_failure_leaves_the_file_as_it_was(tmp_path):
     write(tmp_path / "a.png")
-    with pytest.raises(RuntimeError), atomic_file(tmp_path / "a.png") as temporary:
-        temporary.write_bytes(b"half")
+    with pytest.raises(RuntimeError), atomic_file(tmp_path / "a.png") as file:
+        file.write(b"half")
         raise RuntimeError
     assert (tmp_path / "a.png").read_bytes() == b"y" and len(list(tmp_path.iterdir())) == 1

@@ -75,7 +75,7 @@ def _check_names(scene: Scene, options: RunOptions) -> None:
         if name is not None
     ]
     for path, what, start in written:
-        check_folder(path)
+        check_folder(path, start, frames)
         for name in files_written(path, start, frames):
             if name in taken:
                 raise ValueError(f"{name}: that is {taken[name]}; write to another name")
