@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -58,6 +59,23 @@ def test_a_process_of_another_machine_keeps_its_file(tmp_path):
     check_folder(tmp_path / "a.png")
     write(tmp_path / "a.png")
     assert left.exists()
+
+
+def test_two_containers_may_share_a_folder_the_host_name_and_a_process_number(tmp_path):
+    """Numbers of processes mean nothing in another namespace, whose processes are not seen here."""
+    left = killed_while_writing(tmp_path / "a.png")
+    live = left.with_name(left.name.replace(re.search(r"\.\d+(?=-\d+-\d+\.part)", left.name)[0], ".1"))
+    left.rename(live)
+    write(tmp_path / "a.png")
+    assert live.exists()
+
+
+def test_two_hosts_may_write_one_file_with_one_process_number(tmp_path, monkeypatch):
+    names = []
+    for host in ("one", "other"):
+        monkeypatch.setattr(platform, "node", lambda host=host: host)
+        names.append(write(tmp_path / "a.png"))
+    assert names[0] != names[1]
 
 
 @pytest.mark.parametrize(

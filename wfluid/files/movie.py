@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from wfluid.domain.timeline import exact_rate
 from wfluid.pictures.picture import Picture, display_rgb
 from wfluid.system.atomic import atomic_file, writing
 
@@ -107,8 +108,7 @@ class MovieWriter:
         codec, options = CODECS[ending]
         self._container = av.open(self._disk, "w", format=ending[1:], options={"fflags": "+bitexact"})
         self._open.callback(self._container.close)
-        rate = Fraction(self.fps).limit_denominator(1001)
-        self._stream = self._container.add_stream(codec, rate=rate, options=options)
+        self._stream = self._container.add_stream(codec, rate=exact_rate(self.fps), options=options)
         self._stream.height, self._stream.width = height, width
         self._stream.pix_fmt = "yuv420p"
         context = self._stream.codec_context

@@ -107,7 +107,7 @@ def _prefix(path: Path) -> str:
     A stem that is too long is cut, and a hash of the full stem is appended.
     """
     host = re.sub(r"[^\w.-]", "_", platform.node()).encode()[-HOST_LIMIT:].decode(errors="ignore")
-    rest = f".wfluid-{host}{_numbers()}-"
+    rest = f".wfluid-{host}{_namespace()}-"
     numbers = len("4194304-00000000000000000000.part")  # the longest process number and start
     room = NAME_LIMIT - 1 - len(rest.encode()) - numbers - len(os.fsencode(path.suffix))
     stem = path.stem
@@ -117,7 +117,7 @@ def _prefix(path: Path) -> str:
     return f".{stem}{rest}"
 
 
-def _numbers() -> str:
+def _namespace() -> str:
     """The namespace of process numbers, one a container, as a number after a point; "" if unknown.
 
     Containers may share the host's name: a process of another one has a number that means nothing here.
