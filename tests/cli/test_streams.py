@@ -3,9 +3,11 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import warp as wp
 from command import wfluid_process
 
 from wfluid.pictures.picture import Picture
@@ -82,3 +84,13 @@ def test_a_home_that_cannot_be_written_is_refused_with_the_remedy(folder, home):
     assert result.returncode == 2 and result.stderr.count("\n") == 1
     assert result.stderr.startswith(f"wfluid animate: {home}")
     assert "name another one in WARP_CACHE_PATH" in result.stderr
+
+
+def test_a_figure_needs_no_home(folder, device):
+    pytest.importorskip("matplotlib")
+    cache = str(Path(wp.config.kernel_cache_dir).parent)
+    flags = (*QUICK[2:], "--quiet", "--move", "30,20:31,20", "--plot", folder / "p.png")
+    environment = {**os.environ, "HOME": "/proc/none", "WARP_CACHE_PATH": cache}
+    result = wfluid_process("keyframes", folder / "a.png", *flags, env=environment)
+    assert result.returncode in (0, 1) and "atplotlib" not in result.stderr
+    assert (folder / "p.png").exists()

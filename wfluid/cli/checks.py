@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,7 @@ def check_run(scene: Scene, options: RunOptions) -> None:
     if options.plot:
         if not scene.keyframes:
             raise ValueError("--plot draws keyframes: the scene has none")
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its own folders
         check_plot(options.plot)
     asked = options.preview or options.save_scene or options.plot or options.dry_run
     if not (scene.outputs or asked):
