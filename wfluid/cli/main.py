@@ -15,7 +15,10 @@ from wfluid.cli.streams import safe_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line; returns the exit code."""
+    """Run a command line; returns the exit code.
+
+    Without `arguments`, those of the process.
+    """
     words = sys.argv[1:] if arguments is None else list(arguments)
     with safe_streams() as failure:
         try:

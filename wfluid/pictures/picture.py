@@ -118,8 +118,9 @@ def intensity(picture: Picture) -> np.ndarray:
     pixels, alpha = picture.pixels, picture.alpha
     wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
     if wrong.any():
+        value = pixels[wrong].flat[0]
         raise PictureError(
-            f"a picture with the value {pixels[wrong].flat[0]}: expected finite values from 0 on"
+            f"a picture with the value {value} has no intensity: expected finite values from 0 on"
         )
     colours = picture.color_channels[:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)
