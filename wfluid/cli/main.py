@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             code = _run(words)
         except SystemExit as end:  # of the parser, such as after --help
-            code = end.code
+            code = end.code if isinstance(end.code, int) else Exit.FAILED
         if code == Exit.DONE and (why := failure()):
             print(f"wfluid: failed: what it prints was cut off ({why})", file=sys.stderr)
             return Exit.FAILED

@@ -64,5 +64,6 @@ def _through_pipe(write: Callable[[str], None]) -> bytes:
     """The bytes that `write` writes to a pipe, collected by a process: libraries may block all threads."""
     command = [sys.executable, "-I", "-S", "-c", _COLLECT]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as collector:
-        write(f"/dev/fd/{collector.stdin.fileno()}")
+        if collector.stdin is not None:
+            write(f"/dev/fd/{collector.stdin.fileno()}")
         return collector.communicate()[0]
