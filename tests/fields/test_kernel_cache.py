@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import warp as wp
 
+from wfluid.fields.device import load_kernels
 from wfluid.fields.kernel_cache import load_intact
 
 
@@ -83,6 +84,15 @@ def test_missing_files_are_left_to_warp(load, tmp_path):
     load()
     (tmp_path / "kernels" / "m.o").unlink()
     assert load() == "built"
+
+
+def test_a_cache_that_cannot_be_written_to_is_refused_with_the_remedy(device, monkeypatch):
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("wfluid.fields.device.load_intact", fail)
+    with pytest.raises(RuntimeError, match=r"\(No space left on device\); name another folder in WARP_CACHE"):
+        load_kernels(device)
 
 
 @pytest.mark.long

@@ -87,6 +87,8 @@ WRONG = {
     "x,y,,v\n1,2,three,4": "2: to x 'three': expected a number",
     "1,2,3,4_0": "1: to y '4_0': expected a number",
     "x;y;u;v\n1;2;3,5,1;4": "2: u '3,5,1': expected a number",
+    '"20,5","20,5","22,5","21,5"': "1: from x '20,5': expected a number; numbers with decimal commas are "
+    "separated by semicolons",
     "1.000,5;2;3;4": "1: from x '1.000,5': expected a number",
     "20px,20,22,20\n1,2,3,4": "1: from x '20px': expected a number",
     "20px,20px,22px,20px\n1,2,3,4": "1: from x '20px': expected a number",

@@ -58,12 +58,17 @@ def load_kernels(device: wp.Device, module: str = FORWARD) -> float:
     They are compiled if the cache lacks them, or if the files in the cache are damaged.
 
     Raises:
-        RuntimeError: the kernels do not compile for this device.
+        RuntimeError: the kernels do not compile for this device, or the cache cannot be written to.
     """
     start = time.perf_counter()
     program = module_of(_kind(device), module)
     try:
         loaded = load_intact(_folder(device, module), lambda: program.load(device, _threads(device)))
+    except OSError as error:
+        raise RuntimeError(
+            f"{wp.config.kernel_cache_dir}: the kernels cannot be kept here ({error.strerror}); "
+            "name another folder in WARP_CACHE_PATH"
+        ) from error
     except Exception as error:  # Warp's are bare
         raise RuntimeError(f"the kernels could not be built for {device.alias} ({error})") from error
     if loaded is None:

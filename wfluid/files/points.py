@@ -185,7 +185,8 @@ def _value(text: str, name: str, separator: str) -> float:
     value = _number(text, separator)
     shown = text if len(text) <= _LONGEST else text[:_LONGEST] + "…"
     if value is None:
-        raise ValueError(f"{name} {shown!r}: expected a number")
+        hint = "; numbers with decimal commas are separated by semicolons" if "," in text else ""
+        raise ValueError(f"{name} {shown!r}: expected a number{hint if separator == ',' else ''}")
     if not math.isfinite(value):
         raise ValueError(f"{name} {shown}: expected a finite number")
     return value
