@@ -12,7 +12,7 @@ from command import wfluid_process
 from wfluid.files import movie
 from wfluid.pictures.formats import WRITES, PictureError
 from wfluid.pictures.picture import Picture
-from wfluid.pictures.stills import write_picture
+from wfluid.pictures.stills import read_picture, write_picture
 from wfluid.system.encoded import encoded
 
 QUICK = ("--push", "40,30:3,0:radius=10", "--cells", "16", "--duration", "0.1", "--fps", "10", "--quiet")
@@ -27,7 +27,7 @@ from wfluid.files.output import open_output
 from wfluid.files.tracks import TrackWriter
 from wfluid.pictures.formats import WRITES
 from wfluid.pictures.picture import Picture
-from wfluid.pictures.stills import write_picture
+from wfluid.pictures.stills import read_picture, write_picture
 from wfluid.system.atomic import atomic_write_text
 from wfluid.system.errors import WriteError
 
@@ -188,3 +188,13 @@ def test_a_dpx_knows_its_name(tmp_path):
     """Not that of a temporary file, which differs from run to run."""
     write_picture(tmp_path / "a.dpx", Picture(np.zeros((4, 4, 3), np.float32), dtype="uint8"))
     assert (tmp_path / "a.dpx").read_bytes()[36:136] == b"a.dpx".ljust(100, b"\0")
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".exr"])
+def test_a_system_without_files_in_memory_writes_the_same(tmp_path, monkeypatch, ending):
+    picture = Picture(np.random.default_rng(0).random((40, 60, 3)).astype(np.float32), dtype="uint8")
+    write_picture(tmp_path / f"a{ending}", picture)
+    monkeypatch.delattr("os.memfd_create")
+    write_picture(tmp_path / f"b{ending}", picture)
+    first, second = (read_picture(tmp_path / f"{name}{ending}").pixels for name in "ab")
+    assert np.array_equal(first, second)

@@ -21,15 +21,17 @@ def encoded(write: Callable[[str], None], in_order: bool = False) -> bytes:
     """The bytes of the file that `write` writes to a path, or a ValueError that says why it cannot.
 
     The file is in memory. Where the system limits the size of files, the limit holds for it too. Libraries
-    that write from beginning to end (`in_order`) then write to a pipe, which has no limit.
+    that write from beginning to end (`in_order`) then write to a pipe, which has no limit. On a system
+    without files in memory they write to a pipe always, and others to the folder of temporary files.
 
     Raises:
         WriteError: the file is larger than the limit.
     """
     limit = _size_limit()
-    if in_order and limit is not None:
+    has_memory_files = hasattr(os, "memfd_create") and os.path.isdir("/proc/self/fd")
+    if in_order and os.path.isdir("/dev/fd") and not (has_memory_files and limit is None):
         return _through_pipe(write)
-    if hasattr(os, "memfd_create") and os.path.isdir("/proc/self/fd"):
+    if has_memory_files:
         descriptor = os.memfd_create("wfluid")
         path = f"/proc/self/fd/{descriptor}"
     else:
