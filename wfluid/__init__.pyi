@@ -67,6 +67,7 @@ from wfluid.staging.drawing import Drawing as Drawing
 from wfluid.step.solver import Solver as Solver
 from wfluid.step.solver import SolveReport as SolveReport
 from wfluid.system.errors import FileError as FileError
+from wfluid.system.errors import WriteError as WriteError
 from wfluid.view.coordinate_map import CoordinateMap as CoordinateMap
 from wfluid.view.lookup import LookUp as LookUp
 from wfluid.view.quality import MapQuality as MapQuality

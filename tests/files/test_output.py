@@ -1,5 +1,6 @@
 """Animations as files: names, numbers, delays, atomic writing."""
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,34 @@ def test_sequences_are_numbered_from_1001(tmp_path, name, first):
     written = write(tmp_path / name, 3, 24)
     assert written[0].name == first and len(written) == 3
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in written)
+
+
+@pytest.mark.parametrize("name", ["take#1.gif", "100%done.gif", "take#1.webm"])
+def test_a_file_that_holds_all_frames_may_have_a_number_sign_in_its_name(tmp_path, name):
+    if not name.endswith(".gif") and not movie.available():
+        pytest.skip("the extra `video` is not installed")
+    assert write(tmp_path / name, 2, 10) == [tmp_path / name]
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["a.####.gif", "a.%04d.gif", "a.%d.gif", "a.##.mp4"])
+def test_a_file_that_holds_all_frames_has_no_frame_number(tmp_path, name):
+    with pytest.raises(PictureError, match=r"holds all frames; name it without a number, or .* x\.####\.png"):
+        open_output(tmp_path / name, 10)
+
+
+def test_a_percent_before_a_word_is_no_number(tmp_path):
+    assert [path.name for path in write(tmp_path / "100%done.%02d.png", 2, 10)] == [
+        "100%done.1001.png",
+        "100%done.1002.png",
+    ]
+
+
+def test_a_movie_of_television_has_its_exact_rate(tmp_path):
+    av = pytest.importorskip("av")
+    write(tmp_path / "a.mp4", 3, 29.97)
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        assert container.streams.video[0].average_rate == Fraction(30000, 1001)
 
 
 def test_two_numbers_in_a_name_are_refused():

@@ -86,7 +86,20 @@ WRONG = {
     f"{HEADER}1,two,3,4": "2: y_cat 'two': expected a number",
     "x,y,,v\n1,2,three,4": "2: to x 'three': expected a number",
     "1,2,3,4_0": "1: to y '4_0': expected a number",
-    "x;y;u;v\n1;2;3,5;4": "2: u '3,5': expected a number",
+    "x;y;u;v\n1;2;3,5,1;4": "2: u '3,5,1': expected a number",
+    '"20,5","20,5","22,5","21,5"': "1: from x '20,5': expected a number; numbers with decimal commas are "
+    "separated by semicolons",
+    "1.000,5;2;3;4": "1: from x '1.000,5': expected a number",
+    "20px,20,22,20\n1,2,3,4": "1: from x '20px': expected a number",
+    "20px,20px,22px,20px\n1,2,3,4": "1: from x '20px': expected a number",
+    "(1,(2,(3,(4\n1,2,3,4": "1: from x '(1': expected a number",
+    "#N/A;1;2;3\n1;2;3;4": "1: from x '#N/A': expected a number",
+    "20,5,20,5,22,5,21,5": "1: 8 columns; expected from x, from y, to x, to y and perhaps time, separated by "
+    "commas, semicolons or tabs; numbers with decimal commas are separated by semicolons",
+    "sep=;\n1,2,3,4": "2: 1 column; expected from x",
+    f"{HEADER}1,2,3,4\n\n9,9,9,9\n1,2,5,6": "5: the point 1,2 stands in line 2 already; keep one of them",
+    "1,2,3,4\n5,6,3,4": "2: the destination 3,4 stands in line 1 already; keep one of them",
+    "1,2,3,4,1\n1,2,3,4,1": "2: the point 1,2 stands in line 1 already; keep one of them",
     f"{HEADER}1,2,,4": "2: x_raccoon is missing",
     '"x" , y ,"u" ,v\n1,2, ,4': "2: u is missing",
     "1,nan,3,4": "1: from y nan: expected a finite number",
@@ -97,8 +110,8 @@ WRONG = {
     '1,2,3,4\n5,6,7,"8': "2: a quote is not closed",
     "1,2,3," + 99 * "x": f"1: to y '{30 * 'x'}…': expected a number",
     "1,2,3," + 200_000 * "x": "1: field larger than field limit",
-    b"\x89PNG\r\n\x1a\n\xff": " cannot be read (no UTF-8 text)",
-    "1,2,3,4".encode("utf-16"): " cannot be read (no UTF-8 text)",
+    b"\x89PNG\r\n\x1a\n\xff": " cannot be read (no UTF-8 text); save it as UTF-8",
+    "1,2,3,4".encode("utf-16") + b"\x00": " cannot be read (no UTF-8 text); save it as UTF-8",
 }
 """Contents of invalid files, and the message after the file's name."""
 
@@ -110,6 +123,42 @@ def test_an_invalid_line_is_refused_with_its_number(read, tmp_path, content):
     message = str(refusal.value)
     assert message.startswith(f"{tmp_path / 'points.csv'}:{WRONG[content]}")
     assert "\n" not in message and len(message) < len(str(tmp_path)) + 200
+
+
+DECIMALS = [((20.5, 20.5), (22.5, 21.25)), ((-0.5, 3.0), (1e-3, 4.0))]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "20,5;20,5;22,5;21,25\n-0,5;3;,1e-2;4",
+        "20,5\t20,5\t22,5\t21,25\n-,5\t3\t0,001\t4\n",
+        "sep=;\r\nx;y;u;v\r\n20,5;20.5;+22,5;21,25\r\n\N{MINUS SIGN}0,5;3;1E-3;4",
+        '"sep=|"\n20,5|20,5|22,5|21,25\n-0,5|3|0,001|4',
+        "sep=,\n20.5,20.5,22.5,21.25\n-.5,3,.001,4",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_decimal_commas_are_numbers_where_no_comma_separates(read, text, encoding):
+    """A row of them is no header: every point is kept."""
+    assert places(read(text.encode(encoding))) == DECIMALS
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_utf_16_without_its_mark_is_read(read, encoding):
+    assert places(read((HEADER + ROWS).encode(encoding))) == PLACES
+
+
+def test_a_big_endian_file_is_read(read):
+    assert places(read(b"\xfe\xff" + (HEADER + ROWS).encode("utf-16-be"))) == PLACES
+
+
+def test_a_header_may_have_digits_after_its_letters(read):
+    assert places(read("x1,y1,x2,y2\n1,2,3,4")) == [((1.0, 2.0), (3.0, 4.0))]
+
+
+def test_a_point_may_have_a_destination_at_each_time(read):
+    assert len(read("1,2,3,4,0.5\n1,2,5,6,1\n7,8,3,4,1")) == 3
 
 
 def test_a_missing_file_or_a_folder_is_refused(tmp_path):

@@ -2,8 +2,10 @@
 
 import os
 import platform
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -17,8 +19,8 @@ from pathlib import Path
 from wfluid.system.atomic import atomic_file
 if len(sys.argv) > 2:
     platform.node = lambda: sys.argv[2]
-with atomic_file(Path(sys.argv[1])) as temporary:
-    temporary.write_bytes(b"x")
+with atomic_file(Path(sys.argv[1])) as file:
+    file.write(b"x")
     os.kill(os.getpid(), signal.SIGKILL)
 """
 
@@ -32,9 +34,9 @@ def killed_while_writing(path, *host):
 
 
 def write(path):
-    with atomic_file(path) as temporary:
-        temporary.write_bytes(b"y")
-        return temporary.name
+    with atomic_file(path) as file:
+        file.write(b"y")
+        return Path(file.name).name
 
 
 def test_a_writer_removes_the_temporary_file_of_a_killed_process(tmp_path):
@@ -59,6 +61,23 @@ def test_temporary_files_of_other_hosts_are_kept(tmp_path):
     assert left.exists()
 
 
+def test_two_containers_may_share_a_folder_the_host_name_and_a_process_number(tmp_path):
+    """Numbers of processes mean nothing in another namespace, whose processes are not seen here."""
+    left = killed_while_writing(tmp_path / "a.png")
+    live = left.with_name(left.name.replace(re.search(r"\.\d+(?=-\d+-\d+\.part)", left.name)[0], ".1"))
+    left.rename(live)
+    write(tmp_path / "a.png")
+    assert live.exists()
+
+
+def test_two_hosts_may_write_one_file_with_one_process_number(tmp_path, monkeypatch):
+    names = []
+    for host in ("one", "other"):
+        monkeypatch.setattr(platform, "node", lambda host=host: host)
+        names.append(write(tmp_path / "a.png"))
+    assert names[0] != names[1]
+
+
 @pytest.mark.parametrize(
     "name", [".backup.2023.part.zip", ".movie.99999999.part.mkv", ".a.99999999.part.png"]
 )
@@ -79,10 +98,10 @@ def test_a_check_removes_nothing(tmp_path):
 
 
 def test_temporary_files_of_running_processes_are_kept(tmp_path):
-    with atomic_file(tmp_path / "a.png") as temporary:
-        temporary.write_bytes(b"x")
+    with atomic_file(tmp_path / "a.png") as file:
+        file.write(b"x")
         subprocess.run([sys.executable, "-c", KILLED.replace("os.kill", "0 and os.kill"), tmp_path / "a.png"])
-        assert (tmp_path / "a.png").read_bytes() == b"x" and temporary.exists()
+        assert (tmp_path / "a.png").read_bytes() == b"x" and Path(file.name).exists()
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
@@ -113,7 +132,7 @@ def test_the_longest_names_can_be_written(tmp_path, monkeypatch, letter):
 
 def test_a_failure_leaves_the_old_file(tmp_path):
     write(tmp_path / "a.png")
-    with pytest.raises(RuntimeError), atomic_file(tmp_path / "a.png") as temporary:
-        temporary.write_bytes(b"half")
+    with pytest.raises(RuntimeError), atomic_file(tmp_path / "a.png") as file:
+        file.write(b"half")
         raise RuntimeError
     assert (tmp_path / "a.png").read_bytes() == b"y" and len(list(tmp_path.iterdir())) == 1

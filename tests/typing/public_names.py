@@ -68,6 +68,7 @@ from wfluid import (
     Walls,
     WarpObjective,
     Wind,
+    WriteError,
     animate,
     match_keyframes,
     morph,
@@ -188,4 +189,6 @@ def read_and_written() -> None:
     except PictureError as error:
         assert_type(error.args, tuple[Any, ...])
     except FileError as error:
+        assert_type(error.args, tuple[Any, ...])
+    except WriteError as error:
         assert_type(error.args, tuple[Any, ...])

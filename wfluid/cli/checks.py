@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,7 @@ def check_run(scene: Scene, options: RunOptions) -> None:
             raise ValueError(
                 "--plot draws the search for keyframes, and the scene has none: give --move, or leave it out"
             )
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its own folders
         check_plot(options.plot)
     asked = options.preview or options.save_scene or options.plot or options.dry_run
     if not (scene.outputs or asked):
@@ -81,7 +83,7 @@ def _check_names(scene: Scene, options: RunOptions) -> None:
         if name is not None
     ]
     for path, what, start in written:
-        check_folder(path)
+        check_folder(path, start, frames)
         for name in files_written(path, start, frames):
             if name in taken:
                 raise ValueError(f"{name} is {taken[name]}: write to another name")

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from wfluid.cli.exits import Exit
 from wfluid.cli.parser import build_parser
+from wfluid.cli.streams import safe_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -19,6 +20,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Without `arguments`, those of the process.
     """
     words = sys.argv[1:] if arguments is None else list(arguments)
+    with safe_streams() as failure:
+        try:
+            code = _run(words)
+        except SystemExit as end:  # of the parser, such as after --help
+            code = end.code if isinstance(end.code, int) else Exit.FAILED
+        if code == Exit.DONE and (why := failure()):
+            print(f"wfluid: failed: what it prints was cut off ({why})", file=sys.stderr)
+            return Exit.FAILED
+        return code
+
+
+def _run(words: Sequence[str]) -> int:
     command = next((word for word in words if not word.startswith("-")), "")
     options = build_parser(command).parse_args(words)
     options.arguments = words

@@ -257,6 +257,7 @@ def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
     """Write a report as JSON; on an error no file is left behind.
 
     Raises:
-        FileError: the file cannot be written.
+        FileError: a name that cannot be written to.
+        WriteError: the file cannot be written to its end, as on a full disk.
     """
     atomic_write_text(Path(path), json.dumps(report, indent=2) + "\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from wfluid.domain.limits import FPS, FPS_LIMIT, LEAST_FPS, STEPS_PER_SECOND
 
@@ -29,6 +30,19 @@ def substeps_for(times: Sequence[float], fps: float, least: float) -> int:
     return fewest
 
 
+_NTSC = {
+    round(nominal / 1.001, digits): Fraction(nominal * 1000, 1001)
+    for nominal in (24, 30, 48, 60, 120, 240)
+    for digits in (2, 3)
+}
+"""Exact frame rates of American television (SMPTE ST 12), by the rounded numbers that stand for them."""
+
+
+def exact_rate(fps: float) -> Fraction:
+    """A frame rate as a fraction: 29.97 is 30000/1001, 23.976 and 23.98 are 24000/1001."""
+    return _NTSC.get(fps) or Fraction(fps).limit_denominator(1001)
+
+
 @dataclass(frozen=True)
 class Timeline:
     """Frames at times n / fps for n = 0 … round(duration fps), with `substeps` solver steps between two.
@@ -41,7 +55,7 @@ class Timeline:
     duration: float
     """Duration [s], above 0."""
     fps: float = FPS
-    """Frame rate [1/s]."""
+    """Frame rate [1/s]; 29.97 and its like become 30000/1001, see `exact_rate`."""
     substeps: int | None = None
     """Steps per frame; by default the smallest number for which a step is at most 1/96 s."""
 
@@ -57,6 +71,8 @@ class Timeline:
                 f"{self.duration:g} s at {self.fps:g} fps is {self.duration * self.fps:g} frames: "
                 f"expected 1 … {FRAME_LIMIT}"
             )
+        if self.fps in _NTSC:
+            object.__setattr__(self, "fps", float(_NTSC[self.fps]))
         if not LEAST_FPS <= self.fps <= FPS_LIMIT:
             raise ValueError(f"fps {self.fps:g}: expected {LEAST_FPS:g} … {FPS_LIMIT:g}")
         if self.dt > STEP_LIMIT:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.files import movie
+from wfluid.pictures.encoder import file_bytes
 from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture, display_rgb
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write
 
 LONGEST_DELAY = 65535
 """Longest delay of a GIF, limited by two bytes [1/100 s]."""
@@ -44,19 +45,16 @@ class GifWriter:
         if not self._frames:
             return
         hundredths = delays(len(self._frames), self.fps)
-        with atomic_file(self.path) as temporary:
-            if movie.available():
-                movie.write_gif(temporary, self._frames, hundredths)
-            else:
-                _write_gif(temporary, self._frames, hundredths)
+        make = movie.gif_bytes if movie.available() else _gif_bytes
+        atomic_write(self.path, make(self.path, self._frames, hundredths))
         self.written.append(self.path)
 
     def abandon(self) -> None:
         """Do nothing: no file exists before `close`."""
 
 
-def _write_gif(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> None:
-    """Write 8-bit RGB frames as a GIF with OpenImageIO, with a palette for each frame.
+def _gif_bytes(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> bytes:
+    """8-bit RGB frames as a GIF made by OpenImageIO, with a palette for each frame.
 
     OpenImageIO gives all frames one delay, so that the delays are corrected in the finished file.
     """
@@ -64,17 +62,9 @@ def _write_gif(path: Path, frames: list[np.ndarray], hundredths: list[int]) -> N
 
     height, width, channels = frames[0].shape
     spec = oiio.ImageSpec(width, height, channels, "uint8")
-    out = oiio.ImageOutput.create(str(path))
-    done = out.open(str(path), (spec,) * len(frames))
-    for index, frame in enumerate(frames):
-        done = done and (index == 0 or out.open(str(path), spec, "AppendSubimage"))
-        done = done and out.write_image(frame)
-    message = out.geterror()
-    if not (out.close() and done):
-        raise PictureError(f"{path}: cannot be written ({message.strip() or 'no reason given'})")
-    data = bytearray(path.read_bytes())
+    data = bytearray(file_bytes(path, [spec] * len(frames), frames))
     set_delays(data, hundredths)
-    path.write_bytes(data)
+    return bytes(data)
 
 
 def delays(frames: int, fps: float) -> list[int]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from fractions import Fraction
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
+from wfluid.domain.timeline import exact_rate
 from wfluid.pictures.picture import Picture, display_rgb
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_file, writing
 
 CODECS = {
     ".mp4": ("libx264", {"crf": "16", "preset": "medium"}),
@@ -34,6 +37,32 @@ def available() -> bool:
     return True
 
 
+class _Disk:
+    """A file for FFmpeg, which reports a failed write late or not at all: the failure is kept for `check`."""
+
+    def __init__(self, file: BinaryIO):
+        self._file, self._failure = file, None
+        self.seek, self.tell = file.seek, file.tell
+
+    def write(self, data: bytes) -> int:
+        """Write, unless a write failed before; returns the number of bytes as if all were well."""
+        try:
+            if self._failure is None:
+                self._file.write(data)
+        except OSError as error:
+            self._failure = error
+        return len(data)
+
+    def check(self) -> None:
+        """Report a failure.
+
+        Raises:
+            OSError: the first write that failed.
+        """
+        if self._failure is not None:
+            raise self._failure
+
+
 class MovieWriter:
     """A writer of MP4 or WebM that encodes each frame as it comes: 8-bit BT.709, 4:2:0.
 
@@ -46,10 +75,18 @@ class MovieWriter:
         self._open, self._frames = ExitStack(), 0
 
     def write(self, picture: Picture) -> None:
-        """Encode the next frame."""
+        """Encode the next frame.
+
+        Raises:
+            WriteError: the file cannot be written to its end, as on a full disk.
+        """
+        frame = display_rgb(picture)
+        with writing(self.path):
+            self._encode(frame)
+
+    def _encode(self, frame: np.ndarray) -> None:
         import av
 
-        frame = display_rgb(picture)
         if self._frames == 0:
             self._begin(frame.shape[0] + frame.shape[0] % 2, frame.shape[1] + frame.shape[1] % 2)
         sizes = zip((self._stream.height, self._stream.width), frame.shape[:2], strict=True)
@@ -58,18 +95,20 @@ class MovieWriter:
         image = image.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         image.pts, image.time_base = self._frames, 1 / self._stream.codec_context.framerate
         self._container.mux(self._stream.encode(image))
+        self._disk.check()
         self._frames += 1
 
     def _begin(self, height: int, width: int) -> None:
         """Open the file for frames of a size."""
         import av
 
-        temporary = self._open.enter_context(atomic_file(self.path))
-        codec, options = CODECS[self.path.suffix.lower()]
-        self._container = av.open(f"file:{temporary}", "w", options={"fflags": "+bitexact"})
+        ending = self.path.suffix.lower()
+        self._disk = _Disk(self._open.enter_context(atomic_file(self.path)))
+        self._open.callback(self._disk.check)
+        codec, options = CODECS[ending]
+        self._container = av.open(self._disk, "w", format=ending[1:], options={"fflags": "+bitexact"})
         self._open.callback(self._container.close)
-        rate = Fraction(self.fps).limit_denominator(1001)
-        self._stream = self._container.add_stream(codec, rate=rate, options=options)
+        self._stream = self._container.add_stream(codec, rate=exact_rate(self.fps), options=options)
         self._stream.height, self._stream.width = height, width
         self._stream.pix_fmt = "yuv420p"
         context = self._stream.codec_context
@@ -78,21 +117,27 @@ class MovieWriter:
         context.color_range = _VIDEO_RANGE
 
     def close(self) -> None:
-        """Finish the file and give it its name, if there are frames."""
+        """Finish the file and give it its name, if there are frames.
+
+        Raises:
+            WriteError: the file cannot be written to its end, as on a full disk.
+        """
         if self._frames:
-            self._container.mux(self._stream.encode(None))
-            self._open.close()
+            with writing(self.path):
+                self._container.mux(self._stream.encode(None))
+                self._open.close()
             self.written.append(self.path)
             self._frames = 0
 
     def abandon(self) -> None:
         """Remove the unfinished file."""
-        self._open.pop_all().__exit__(RuntimeError, RuntimeError(), None)
+        with suppress(OSError):  # the disk may still be full
+            self._open.pop_all().__exit__(RuntimeError, RuntimeError(), None)
         self._frames = 0
 
 
-def write_gif(path: Path, frames: Sequence[np.ndarray], delays: Sequence[int]) -> None:
-    """Write 8-bit RGB frames as an endless GIF with one palette and a delay for each frame [1/100 s]."""
+def gif_bytes(_: Path, frames: Sequence[np.ndarray], delays: Sequence[int]) -> bytes:
+    """8-bit RGB frames as an endless GIF with one palette and a delay for each frame [1/100 s]."""
     import av
 
     height, width, _ = frames[0].shape
@@ -115,7 +160,8 @@ def write_gif(path: Path, frames: Sequence[np.ndarray], delays: Sequence[int]) -
         start += delay
     source.push(None)
     options = {"loop": "0", "final_delay": str(delays[-1])}
-    with av.open(f"file:{path}", "w", format="gif", options=options) as out:
+    file = io.BytesIO()
+    with av.open(file, "w", format="gif", options=options) as out:
         stream = out.add_stream("gif", rate=100)
         stream.width, stream.height, stream.pix_fmt = width, height, "pal8"
         stream.codec_context.time_base = HUNDREDTH
@@ -124,3 +170,4 @@ def write_gif(path: Path, frames: Sequence[np.ndarray], delays: Sequence[int]) -
         for _ in frames:
             out.mux(stream.encode(sink.pull()))
         out.mux(stream.encode(None))
+    return file.getvalue()

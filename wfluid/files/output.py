@@ -44,11 +44,11 @@ def open_output(
     `start` is the number of the first frame of a sequence, `encoding` the encoding of its stills.
 
     Raises:
-        PictureError: an unknown kind of name, a folder that does not exist or cannot be written, a movie
-            without the extra `video`, or an encoding that the format does not support.
+        PictureError: an unknown kind of name, a name that cannot be written to, a movie without the extra
+            `video`, or an encoding that the format does not support.
     """
     path, encoding = Path(path), encoding or Encoding()
-    check_folder(path)
+    check_folder(path, start)
     numbered = numbering(path)
     if numbered is not None:
         encoding.check(path)
@@ -86,6 +86,7 @@ def write_animation(
 
     Raises:
         PictureError: see `open_output`; nothing unfinished is left behind.
+        WriteError: a file cannot be written to its end, as on a full disk.
     """
     output = open_output(path, fps, start, encoding)
     try:

@@ -6,6 +6,7 @@ Bonilla & Velho, figure 3: sources, targets and final positions of points.
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ from wfluid.keyframes.arrival import Arrival
 from wfluid.keyframes.match import Match
 from wfluid.keyframes.search import COARSE, FINE, MARCH
 from wfluid.pictures.picture import Picture, encode
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write
 from wfluid.system.errors import FileError
 
 if TYPE_CHECKING:
@@ -96,17 +97,16 @@ def plot_match(match: Match, path: str | os.PathLike) -> None:
 
     Raises:
         ValueError: matplotlib is not installed.
-        FileError: an unknown ending, or a file that cannot be written.
+        FileError: an unknown ending, or a name that cannot be written to.
+        WriteError: the file cannot be written to its end, as on a full disk.
     """
     path = check_plot(path)
     ending = path.suffix.lower()
     with _styled():
         figure = figure_of(match)
-        try:
-            with atomic_file(path) as temporary:
-                figure.savefig(temporary, format=ending[1:], dpi=_DPI, metadata=_UNDATED[ending])
-        except OSError as error:
-            raise FileError(f"{path}: cannot be written ({error.strerror})") from error
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format=ending[1:], dpi=_DPI, metadata=_UNDATED[ending])
+    atomic_write(path, drawn.getbuffer())
 
 
 def figure_of(match: Match) -> Figure:

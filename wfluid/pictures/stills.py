@@ -10,6 +10,7 @@ import numpy as np
 from wfluid.domain.checks import check_word
 from wfluid.domain.limits import COLORSPACES, TYPES
 from wfluid.pictures import color
+from wfluid.pictures.encoder import file_bytes
 from wfluid.pictures.formats import (
     CHANNELS,
     LARGEST,
@@ -21,7 +22,7 @@ from wfluid.pictures.formats import (
     first_line,
 )
 from wfluid.pictures.picture import Picture, channels_beside, encode
-from wfluid.system.atomic import atomic_file
+from wfluid.system.atomic import atomic_write
 from wfluid.system.memory import free_memory, readable_size
 from wfluid.system.stderr import quiet_stderr
 
@@ -106,10 +107,10 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
     are kept, as are display and data windows if the size is unchanged.
 
     Raises:
-        PictureError: an unknown format, an unsupported setting, or a file that cannot be written.
+        FileError: a name that cannot be written to; a PictureError for an unknown format, an unsupported
+            setting, or a picture that the format cannot hold.
+        WriteError: the file cannot be written to its end, as on a full disk.
     """
-    import OpenImageIO as oiio
-
     path, encoding = Path(path), encoding or Encoding()
     encoding.check(path)
     ending = path.suffix.lower()
@@ -125,14 +126,7 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
         spec.attribute("compression", encoding.compression)
     if encoding.quality is not None:
         spec.attribute("compression", f"{QUALITIES[ending]}:{encoding.quality}")
-    with atomic_file(path) as temporary, quiet_stderr():
-        out = oiio.ImageOutput.create(str(temporary))
-        if out is None:
-            raise PictureError(f"{path}: cannot be written ({first_line(oiio.geterror())})")
-        done = out.open(str(temporary), spec) and out.write_image(np.ascontiguousarray(stored))
-        message = out.geterror()
-        if not (out.close() and done):
-            raise PictureError(f"{path}: cannot be written ({first_line(message or out.geterror())})")
+    atomic_write(path, file_bytes(path, [spec], [stored]), sync=False)
 
 
 def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):

@@ -44,7 +44,8 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
     """Write a scene as TOML, with file names relative to it; on an error no file is left behind.
 
     Raises:
-        FileError: the file cannot be written.
+        FileError: a name that cannot be written to.
+        WriteError: the file cannot be written to its end, as on a full disk.
     """
     path = Path(path)
     document = tomlkit.document()
