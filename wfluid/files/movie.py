@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wfluid.pictures.picture import Picture, display_rgb
+from wfluid.pictures.fitting import Color, display_rgb
+from wfluid.pictures.picture import Picture
 from wfluid.system.atomic import atomic_file
 
 CODECS = {
@@ -37,11 +38,12 @@ def available() -> bool:
 class MovieWriter:
     """A writer of MP4 or WebM that encodes each frame as it comes: 8-bit BT.709, 4:2:0.
 
+    Frames are shown over a `background` in linear light, black by default, where they are transparent.
     The format requires an even width and height: an odd last row or column is repeated.
     """
 
-    def __init__(self, path: Path, fps: float):
-        self.path, self.fps = path, fps
+    def __init__(self, path: Path, fps: float, background: Color | None = None):
+        self.path, self.fps, self.background = path, fps, background
         self.written: list[Path] = []
         self._open, self._frames = ExitStack(), 0
 
@@ -49,7 +51,7 @@ class MovieWriter:
         """Encode the next frame."""
         import av
 
-        frame = display_rgb(picture)
+        frame = display_rgb(picture, self.background)
         if self._frames == 0:
             self._begin(frame.shape[0] + frame.shape[0] % 2, frame.shape[1] + frame.shape[1] % 2)
         sizes = zip((self._stream.height, self._stream.width), frame.shape[:2], strict=True)

@@ -211,6 +211,12 @@ class FramesTable(SceneTable):
         "interpolation between the picture's pixels", word(*FILTERS), default=FILTER, flag="--filter"
     )
     edge: str = key("what lies beyond the picture's edges", word(*EDGES), default=EDGE, flag="--edge")
+    background: str | None = key(
+        "colour behind a transparent picture in outputs without alpha: GIF, movies, JPEG, HDR, BMP",
+        color(),
+        otherwise="black",
+        flag="--background",
+    )
 
 
 class GroupTable(SceneTable):

@@ -90,7 +90,7 @@ class _Builder:
         self.scene, self.note = scene, note
         self._fluid()  # what is wrong without files is refused before they are read
         self.timeline = FLOW if scene.morph else scene.timeline
-        self.picture = read_picture(scene.folder / scene.picture.file, scene.picture.colorspace)
+        self.picture = self._read(scene.picture.file)
         self.images = SceneImages(self.picture, scene.folder, note)
         self.drawing = self._drawing()
         self.pair = self.settings = self.aims = None
@@ -129,9 +129,16 @@ class _Builder:
                 loop=scene.time.loop,
             )
 
+    def _read(self, name: str) -> Picture:
+        """A picture of the scene, with notes on how it was read."""
+        picture = read_picture(self.scene.folder / name, self.scene.picture.colorspace)
+        for text in picture.notes:
+            self.note(f"{name}: {text}")
+        return picture
+
     def _pair(self, morph: MorphTable) -> PicturePair:
         """The two pictures of a morph."""
-        other = read_picture(self.scene.folder / morph.to, self.scene.picture.colorspace)
+        other = self._read(morph.to)
         pair = paired(self.picture, other, morph.fit)
         for text in pair.notes:
             self.note(text)

@@ -42,7 +42,7 @@ class SceneImages:
         """
         if name == SELF:
             return self.picture
-        painting = read_picture(self.folder / name, exact=True)
+        painting = self._noted(name, read_picture(self.folder / name, exact=True))
         aspect = painting.width / painting.height * self.picture.height / self.picture.width
         if abs(aspect - 1) > SAME_ASPECT:
             self.note(
@@ -50,6 +50,11 @@ class SceneImages:
                 f"{self.picture.width} x {self.picture.height}"
             )
         return painting
+
+    def _noted(self, name: str, picture: Picture) -> Picture:
+        for text in picture.notes:
+            self.note(f"{name}: {text}")
+        return picture
 
     def paint(self, name: str) -> Picture:
         """The painting; of the picture itself what is below zero, out of a camera's gamut, is no paint."""
@@ -126,7 +131,7 @@ class SceneImages:
         Raises:
             PictureError: it cannot be read.
         """
-        picture = read_picture(self.folder / name)
+        picture = self._noted(name, read_picture(self.folder / name))
         channels = picture.pixels.shape[2] - (picture.alpha is not None)
         data = channels == 1 if data is None else data
         return read_picture(self.folder / name, "data") if data else picture
