@@ -1,4 +1,4 @@
-"""Frames and steps: when, how many, what they carry."""
+"""Frames and steps of an animation: times, numbers, data."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass, replace
@@ -26,7 +26,7 @@ def checkerboard(width=64, height=48):
 
 
 @given(st.floats(0.05, 30), st.sampled_from([12.0, 15.0, 23.976, 24.0, 25.0, 29.97, 60.0]))
-def test_frames_lie_at_whole_multiples_and_steps_hit_them(duration, fps):
+def test_frames_lie_at_multiples_of_the_step(duration, fps):
     timeline = Timeline(duration, fps)
     assert timeline.frames == round(duration * fps) + 1
     assert timeline.dt <= 1 / 96 + 1e-12
@@ -57,8 +57,8 @@ def test_the_first_frame_is_the_untouched_picture(device):
     assert np.all(first.map.displacement == 0)
 
 
-def test_frames_come_lazily_and_keep_their_own_data(device):
-    """Asking for two frames runs two; a frame does not change when the next is made."""
+def test_frames_are_computed_lazily_and_own_their_data(device):
+    """Requesting two frames computes two; a frame does not change when the next one is computed."""
     frames = animate(checkerboard(), Fluid(), [PUSH], 1e3, 10, cells=32, device=device.alias)
     next(frames)
     second = next(frames)
@@ -69,7 +69,7 @@ def test_frames_come_lazily_and_keep_their_own_data(device):
 
 
 def test_the_flow_preserves_area_and_keeps_sources_inside(device):
-    """Det J within 1 +- 2 % on this gentle push, no look-up outside, divergence near rounding."""
+    """For a gentle push det J is within 1 +- 2 %, no source is outside, the divergence is near rounding."""
     *_, last = animate(checkerboard(), Fluid(), [PUSH], 0.5, 10, cells=64, device=device.alias)
     assert last.quality.displacement_max > 0.02
     assert 0.98 < last.quality.jacobian_min <= last.quality.jacobian_max < 1.02
@@ -88,7 +88,7 @@ def test_the_same_animation_twice_gives_the_same_bits(device):
 
 
 def test_a_dot_moves_with_the_arrow(device):
-    """A white dot on black, blown right and down: its centroid follows, and keeps its mass."""
+    """The centroid of a white dot on black moves right and down with the arrow; its mass is kept."""
     x, y = np.arange(80), np.arange(80)[:, None]
     dot = np.exp(-((x - 40) ** 2 + (y - 40) ** 2) / (2 * 3.0**2)).astype(np.float32)
     blow = GaussianForce((0.506, 0.506), (0.4, 0.2), 0.2, Instantaneous(0.0))
@@ -102,8 +102,8 @@ def test_a_dot_moves_with_the_arrow(device):
 
 @pytest.mark.parametrize("fps", [10, 12, 15, 23.976, 24, 25, 29.97, 30, 50, 60])
 @pytest.mark.parametrize("substeps", [None, 1, 3, 7])
-def test_a_blow_strikes_exactly_once_whenever_it_comes(fps, substeps):
-    """Steps share their edges to the bit, so no instant falls between two or into both."""
+def test_an_instant_acts_exactly_once_at_any_time(fps, substeps):
+    """The end of a step is bit-equal to the start of the next, so that no instant is lost or doubled."""
     timeline = Timeline(2.0, fps, substeps)
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     edges = [timeline.time_of(step) for step in range(steps + 1)]
@@ -112,15 +112,15 @@ def test_a_blow_strikes_exactly_once_whenever_it_comes(fps, substeps):
         assert sum(blow.integral(a, b) for a, b in pairwise(edges)) == 1, at
 
 
-def test_a_blow_between_frames_moves_the_picture(device):
-    """At 0.6 s and 15 frames a second, where rounding once lost it."""
+def test_an_instant_between_frames_moves_the_picture(device):
+    """At 0.6 s and 15 fps, where rounding once lost the instant."""
     blow = GaussianForce((0.5, 0.35), (0.2, 0.0), 0.1, Instantaneous(0.6))
     *_, last = animate(checkerboard(), Fluid(), [blow], 1.0, 15, cells=32, device=device.alias)
     assert last.quality.displacement_max > 0.01
 
 
 def test_frames_never_share_memory(device):
-    """Not even where a row of pixels fills the device's buffer without a gap."""
+    """Also for rows of pixels that fill the device's buffer without padding."""
     image = Picture(np.random.default_rng(0).random((1, 40, 4)).astype(np.float32), 3)
     frames = list(animate(image, Fluid(walls="periodic"), [PUSH], 0.3, 10, cells=32, device=device.alias))
     for frame in frames[1:]:
@@ -128,7 +128,7 @@ def test_frames_never_share_memory(device):
     np.testing.assert_array_equal(frames[0].picture.pixels, image.pixels)
 
 
-def test_animations_in_two_threads_do_not_meet(device):
+def test_animations_in_two_threads_do_not_interfere(device):
     def run(_):
         *_, last = animate(checkerboard(), Fluid(), [PUSH], 0.3, 10, cells=32, device=device.alias)
         return last.picture.pixels
@@ -139,20 +139,20 @@ def test_animations_in_two_threads_do_not_meet(device):
         np.testing.assert_allclose(pixels, results[0], atol=1e-5)
 
 
-def test_a_force_that_is_not_a_number_is_refused_by_its_place(device):
+def test_a_force_that_is_not_finite_is_refused_with_its_place(device):
     force = GaussianForce((0.5, 0.35), (1.0, 0.0), 0.1, Arbitrary(lambda _: float("nan")))
     with pytest.raises(ValueError, match=r"force at \(0.5, 0.35\) would add"):
         list(animate(checkerboard(), Fluid(), [force], 0.2, 10, cells=16, device=device.alias))
 
 
-def test_a_poor_solve_warns_with_its_number_and_the_remedy(device):
+def test_a_poor_solve_warns_with_its_residual_and_the_remedy(device):
     fluid = Fluid(solver="jacobi", sweeps=2)
     with pytest.warns(PoorSolveWarning, match=r"left .*e-0.*multigrid"):
         list(animate(checkerboard(), fluid, [PUSH], 0.2, 10, cells=48, device=device.alias))
 
 
 def test_smaller_frames_are_filtered_not_aliased(device):
-    """A one-pixel checkerboard at half size is grey, and so it stays under a still map."""
+    """A one-pixel checkerboard at half size is grey, also under the identity map."""
     image = Picture(((np.arange(64) + np.arange(64)[:, None]) % 2)[..., None].astype(np.float32))
     frame = next(animate(image, Fluid(), [], 0.2, 10, cells=16, width=32, height=32, device=device.alias))
     inner = frame.picture.pixels[4:-4, 4:-4]
@@ -182,7 +182,7 @@ def test_a_run_measures_its_own_frames_only(device):
 
 
 def test_a_copy_of_an_animation_shares_no_results():
-    """`dataclasses.replace` hands every field on, so none may hold what a run writes to."""
+    """`dataclasses.replace` copies every field, so that no field may hold data that a run changes."""
     animation = Animation(checkerboard(), Fluid(), (PUSH,), Timeline(0.2, 10), loop="pingpong")
     values = {one.name: getattr(animation, one.name) for one in fields(animation) if one.init}
     written = [

@@ -32,7 +32,7 @@ RAMP = Painted(np.linspace(0, 1, CELLS)[None] * np.ones((CELLS, 1)), scale=0.01,
     ids=["constant viscosity", "painted viscosity", "no-slip walls", "a density"],
 )
 def test_the_fields_that_are_counted_hold_those_of_a_solver(device, fluid, fields):
-    """They are 0.6 … 1 of the count, which has room for what the host copies out."""
+    """The allocated arrays are 0.6 … 1 of the count, which includes copies on the host."""
     known = {id(a) for a in gc.get_objects() if isinstance(a, wp.array)}
     force = GaussianForce((0.5, 0.5), (1.0, 0.0), 0.1, Constant(0, 1))
     picture = Picture(np.zeros((CELLS, CELLS, 3), np.float32))

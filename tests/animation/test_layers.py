@@ -1,4 +1,4 @@
-"""Layers, mattes and points go through the picture's map; densities are seen over it."""
+"""Layers, mattes and points follow the picture's map; densities are composited over it."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def picture(height=48, width=64, channels=3, seed=0, **settings):
     return Picture(pixels, settings.get("alpha"), "uint8", None)
 
 
-def test_a_layer_goes_through_the_same_map(device):
-    """The picture itself as a layer is shown as the picture, to the bit; a larger one alike."""
+def test_a_layer_is_warped_by_the_same_map(device):
+    """The picture as a layer gives the frames bit for bit; other sizes are resized to the frames."""
     source = picture()
     force = VortexForce((0.5, 0.35), 8.0, 0.1)
     layers = {"same": source, "coarse": picture(24, 32, seed=1), "grey": picture(48, 64, 1)}
@@ -36,7 +36,7 @@ def test_a_layer_goes_through_the_same_map(device):
 
 
 def test_a_matte_stays_on_its_object(device):
-    """A disc cut out by its matte, before and after: the warped matte fits the warped disc's edge."""
+    """The warped matte of a disc fits the edge of the warped disc."""
     y, x = np.mgrid[:96, :96]
     disc = ((x - 44) ** 2 + (y - 48) ** 2 < 20**2).astype(np.float32)[..., None]
     made = Animation(
@@ -54,7 +54,7 @@ def test_a_matte_stays_on_its_object(device):
 
 
 def test_points_follow_the_picture(device):
-    """A bright dot at p is seen where the point that began at p is."""
+    """A bright dot at p moves with the tracked point that starts at p."""
     pixels = np.zeros((96, 128, 3), dtype=np.float32)
     y, x = np.mgrid[:96, :128] + 0.5
     pixels[:] = np.exp(-((x - 70) ** 2 + (y - 40) ** 2) / (2 * 1.3**2))[..., None]
@@ -75,7 +75,7 @@ def test_points_follow_the_picture(device):
 
 
 def test_a_data_layer_keeps_its_numbers(tmp_path):
-    """A grey matte comes back as it is, to the code; a colour layer is a picture in linear light."""
+    """A grey matte keeps its codes; a colour layer is a picture in linear light."""
     matte, colours = tmp_path / "matte.png", tmp_path / "colours.png"
     codes = (np.arange(64 * 48).reshape(48, 64, 1) % 256 / 255).astype(np.float32)
     write_picture(matte, Picture(codes, None, "uint8", None, data=True))
@@ -90,7 +90,7 @@ def test_a_data_layer_keeps_its_numbers(tmp_path):
 
 
 def test_ink_lets_through_a_power_of_its_colour():
-    """Beer and Lambert: rho layers of ink of density one, in linear light."""
+    """The Beer-Lambert law: color^rho, in linear light."""
     source = picture()
     rho = np.full((12, 16), 2.0)
     shown = composite_densities(source, [Density(color=(0.5, 0.25, 1.0))], [rho])
@@ -98,8 +98,8 @@ def test_ink_lets_through_a_power_of_its_colour():
     assert composite_densities(source, [Density()], [0 * rho]).pixels is source.pixels
 
 
-def test_smoke_covers_and_is_seen_where_the_picture_is_not():
-    """1 - exp(-rho) of its colour over the picture; a transparent place becomes as opaque."""
+def test_smoke_covers_and_is_visible_over_transparent_places():
+    """Smoke covers the picture with opacity 1 - exp(-rho), and gives it to transparent places."""
     pixels = np.zeros((8, 8, 4), dtype=np.float32)
     pixels[:4] = (0.2, 0.4, 0.6, 1.0)
     density = Density(color=(1.0, 0.5, 0.0), look="smoke")
@@ -113,7 +113,7 @@ def test_smoke_covers_and_is_seen_where_the_picture_is_not():
 
 @pytest.mark.parametrize("periodic", [(False, False), (True, True)])
 def test_stretching_keeps_constants_lines_and_the_range(periodic):
-    """A cubic B-spline gives lines back inside, and never leaves the range of its values."""
+    """A cubic B-spline reproduces lines inside and stays within the range of its values."""
     assert np.allclose(upsample(np.full((5, 7), 3.0), 40, 31, periodic), 3.0)
     line = np.broadcast_to(np.arange(16.0), (12, 16))
     across = upsample(line, 64, 48, periodic)[24]
@@ -126,7 +126,7 @@ def test_stretching_keeps_constants_lines_and_the_range(periodic):
         assert abs((wide[0] - wide[-1]) - (wide[1] - wide[0])) < 0.01
 
 
-def test_an_animations_densities_are_seen(device):
+def test_the_densities_of_an_animation_are_visible(device):
     fluid = Fluid(
         densities=[Density("fog", sources=[Source((0.5, 0.35), 20.0, 0.1)], look="smoke", color=(1, 1, 1))]
     )

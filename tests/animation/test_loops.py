@@ -1,4 +1,4 @@
-"""Loops close: periods fit, the last frame meets the first, and the seam's figures say how well."""
+"""Loops close: periods fit, the last frame meets the first, and the seam measures the difference."""
 
 import numpy as np
 import pytest
@@ -37,20 +37,20 @@ def maps(frames):
 
 
 def test_periods_are_fitted_to_the_loop():
-    """The nearest period of which a whole number fills it; an oscillator's start becomes its phase."""
+    """The nearest period that divides the loop; an oscillator's start becomes its phase."""
     assert fitted_period(0.53, 2.0) == 0.5 and fitted_period(5.0, 2.0) == 2.0
     force = GaussianForce(
         (0.5, 0.5), (1, 0), 0.1, Oscillator(period=0.52, phase=0.2, start=0.1) * Fade(rise=0.3)
     )
     swing, fade = fit_to_loop(force, 1.0).envelope.factors
     assert (swing.period, swing.start, swing.centred) == (0.5, 0.0, False) and fade == Fade(rise=0.3)
-    whole = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
-    assert swing.value(0.3) == pytest.approx(whole.value(0.3))
+    full = Oscillator(period=0.5, phase=0.2, start=0.1, centred=False)
+    assert swing.value(0.3) == pytest.approx(full.value(0.3))
     assert fit_to_loop(NoiseForce(strength=1.0, period=0.9), 2.0).period == 1.0
 
 
-def test_blows_make_velocities_swing_about_zero():
-    """A free particle under blow and force has no mean velocity over the loop, whatever the phase."""
+def test_starting_impulses_make_velocities_swing_about_zero():
+    """A free particle under impulse and force has no mean velocity over the loop, for any phase."""
     for phase in (0.0, 0.1, 0.5, 0.8):
         swing = Oscillator(period=0.5, phase=phase, centred=False)
         (blow,) = starting_impulses([GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1, swing)], 1.0, 400)
@@ -65,8 +65,8 @@ def test_blows_make_velocities_swing_about_zero():
     )
 
 
-def test_an_oscillating_loop_comes_back_to_its_untouched_picture(device):
-    """The first frame is the picture itself; the seam's step is one like those around it."""
+def test_an_oscillating_loop_returns_to_its_untouched_picture(device):
+    """The first frame is the picture; the step across the seam is like its neighbours."""
     made = animation("oscillate", [GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)], device)
     run = made.frames()
     frames = list(run)
@@ -83,8 +83,8 @@ def test_an_oscillating_loop_comes_back_to_its_untouched_picture(device):
     assert 0 < seam.drift_mean < seam.drift_max
 
 
-def test_without_the_drift_taken_off_the_loop_would_not_close(device, monkeypatch):
-    """What is taken off is the way that the fluid streams over the lap, and no more."""
+def test_without_subtracting_the_drift_a_loop_does_not_close(device, monkeypatch):
+    """The subtracted drift is the streaming of the fluid over the lap."""
     force = GaussianForce((0.5, 0.4), (4.0, 1.0), 0.1, SWING)
     made = animation("oscillate", [force], device)
     bending = made.frames()
@@ -99,7 +99,7 @@ def test_without_the_drift_taken_off_the_loop_would_not_close(device, monkeypatc
     assert np.abs(bent[7] - even[7]).max() < 1e-6  # bent near the seam only
 
 
-def test_a_pingpong_goes_back_the_way_it_came(device):
+def test_a_pingpong_returns_the_same_way(device):
     made = animation("pingpong", [VortexForce((0.5, 0.4), 6.0, 0.1)], device, duration=0.9)
     run = made.frames()
     frames = list(run)
@@ -112,8 +112,8 @@ def test_a_pingpong_goes_back_the_way_it_came(device):
     assert run.seam.velocity_max == pytest.approx(turn, rel=1e-4)
 
 
-def test_a_crossfade_flows_from_its_end_into_its_beginning(device):
-    """All steps are small, that across the seam too; the middle is the run itself."""
+def test_a_crossfade_has_small_steps_across_its_seam(device):
+    """All steps are small, also across the seam; the middle equals the plain run."""
     force = NoiseForce(strength=2.0, scale=0.4, seed=1)
     run = animation("crossfade", [force], device).frames()
     shown = maps(run)
@@ -138,8 +138,8 @@ def test_densities_and_points_loop_with_the_picture(device):
         assert np.abs(ends[0].points - ends[1].points).max() <= 1.01 * moved, loop
 
 
-def test_what_is_poured_late_is_seen_in_an_oscillating_loop(device):
-    """Densities flow into their beginning towards the end; nothing is subtracted, so none is negative."""
+def test_density_added_late_is_visible_in_an_oscillating_loop(device):
+    """The end of densities is blended into their beginning; nothing is subtracted, so none is negative."""
     source = Source((0.5, 0.4), 5.0, 0.1, Constant(0.4, 0.6))
     fluid = Fluid(densities=[Density(sources=[source])])
     force = GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)
@@ -150,7 +150,7 @@ def test_what_is_poured_late_is_seen_in_an_oscillating_loop(device):
     assert inks[0].max() == 0 and inks[-1].max() < 0.2 * inks.max()
 
 
-def test_a_loop_that_cannot_be_is_refused(device):
+def test_invalid_loops_are_refused(device):
     force = GaussianForce((0.5, 0.5), (1, 0), 0.1)
     with pytest.raises(ValueError, match="expected one of oscillate, pingpong, crossfade"):
         animation("spin", [force], device)
@@ -160,7 +160,7 @@ def test_a_loop_that_cannot_be_is_refused(device):
 
 
 def test_a_loop_of_few_frames_runs(device):
-    """Down to one or two frames nothing breaks."""
+    """Loops of one or two frames run."""
     swing = GaussianForce((0.5, 0.4), (2.0, 1.0), 0.1, SWING)
     for loop in ("oscillate", "pingpong", "crossfade"):
         for frames in (1, 2, 3):

@@ -142,7 +142,7 @@ def count_launches(functional, m):
 
     wp.launch = counted
     try:
-        for work in (recording._record, recording._play_back):
+        for work in (recording.loops.record_forward, recording.loops.record_backward):
             with wp.ScopedCapture(device=recording.device):
                 work()
     finally:

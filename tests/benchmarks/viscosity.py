@@ -65,8 +65,8 @@ def errors(diffusion, velocity):
     exact, left, back = (vector(diffusion.layout, diffusion.device, 2) for _ in range(3))
     best = SolveMethod("conjugate gradients", 60, 1e-6)
     system.prepare(best)
-    system.solve(best, diffusion._change, exact)
-    for f, g, out in zip(exact, diffusion._answer, left, strict=True):
+    system.solve(best, diffusion._b, exact)
+    for f, g, out in zip(exact, diffusion._x, left, strict=True):
         out.assign(f.numpy() - g.numpy())
 
     def energy(x):

@@ -119,7 +119,7 @@ def test_a_time_between_all_steps_is_met_at_the_nearest_and_said(folder):
     scene["time"] = {"duration": 1, "fps": 12}
     aims = stage_all(Scene(scene, folder), note=said.append).aims
     assert abs(aims.keyframes[0].time - 0.7313) < 0.5 / 48 + 1e-9
-    assert said == [f"a keyframe at 0.7313 s is met at {aims.keyframes[0].time:.6g} s, when a step ends"]
+    assert said == [f"a keyframe at 0.7313 s is moved to {aims.keyframes[0].time:.6g} s, the end of a step"]
 
 
 @pytest.fixture(scope="module")
@@ -205,14 +205,14 @@ def test_what_cannot_be_reached_is_finished_and_said(folder, capsys):
     )
     said = capsys.readouterr().err
     assert code == 1 and (folder / "a.gif").exists()
-    assert "unreachable: the farthest point is" in said and "0,0 to 9,9 at 0.25 s: " in said
+    assert "unreachable: the largest residual is" in said and "0,0 to 9,9 at 0.25 s: " in said
     assert "it lies in a corner" in said and "30,20 to" not in said
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "where to? give at least one --move X0,Y0:X1,Y1[@T], or --points FILE.csv"),
+        ((), "no points to move: give at least one --move X0,Y0:X1,Y1[@T], or --points FILE.csv"),
         (("--move", "20,20"), "move '20,20': expected X0,Y0:X1,Y1 or X0,Y0:X1,Y1@SECONDS"),
         (("--move", "20,x:3,4"), "move '20,x:3,4': a point X,Y: 'x' is not a number"),
         (("--move", "20,20:3,4@soon"), "time: 'soon' is not a number"),
@@ -224,7 +224,10 @@ def test_what_cannot_be_reached_is_finished_and_said(folder, capsys):
         (("--move", "1,1:5,5", "--pin", "90,1"), "90,1: outside the picture"),
         (("--move", "1,1:5,5@2", "--duration", "1"), "a keyframe at 2 s: expected at most the duration"),
         (("--move", "1,1:5,5", "--tolerance", "0"), "--tolerance 0"),
-        (("--move", "1,1:5,5", "--loop", "pingpong"), "a loop (pingpong) goes without keyframes"),
+        (
+            ("--move", "1,1:5,5", "--loop", "pingpong"),
+            "a loop (pingpong) ends as it begins, so no keyframe is reached",
+        ),
         (("--move", "1,1:5,5", "--plot", "a.txt"), "a.txt: plots are written as"),
         (("--points", "no.csv"), "no.csv"),
         (("--points", "small.png"), "small.png"),
@@ -268,5 +271,5 @@ def test_an_interrupt_ends_the_search_with_the_best_so_far(folder, capsys, monke
     moves = ("--move", "8,8:13,12", "--move", "50,20:44,23")
     assert main(["keyframes", "small.png", "-o", "a.gif", *moves, *QUICK]) == 130
     said = capsys.readouterr().err
-    assert "stopped: the farthest point is" in said and "8,8 to 13,12 at 0.25 s: " in said
+    assert "stopped: the largest residual is" in said and "8,8 to 13,12 at 0.25 s: " in said
     assert (folder / "a.gif").exists() and len(seen) == 3

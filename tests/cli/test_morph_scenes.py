@@ -134,17 +134,23 @@ def test_what_was_done_to_the_pictures_is_said(folder):
     [
         ({"keyframes": {}}, "keyframes: a morph needs points of both pictures"),
         ({"keyframes": {"pins": [[1, 1]]}}, "keyframes: a morph needs points of both pictures"),
-        ({"force": [{"kind": "wind", "by": [1, 0]}]}, "force: a morph goes without"),
-        ({"layer": [{"name": "a", "file": "left.png"}]}, "layer: a morph goes without"),
-        ({"density": [{"name": "ink"}]}, "density: a morph goes without"),
-        ({"tracks": {"points": [[1, 1]]}}, "tracks: a morph goes without"),
-        ({"effect": {"mask": "left.png"}}, "effect: a morph goes without"),
-        ({"time": {"substeps": 3}}, "time.substeps: a morph goes without"),
-        ({"time": {"loop": "pingpong"}}, "time.loop: a morph goes without: set pingpong"),
-        ({"keyframes": {**MOVES, "time": 1}}, "keyframes.time: a morph goes without"),
-        ({"keyframes": {"move": [{**MOVES["move"][0], "time": 1}]}}, "keyframes.move.0.time: a morph goes"),
-        ({"morph": {"fit": "stretch"}}, "to is missing: the other picture"),
-        ({"morph": {"to": "other.png", "size": [40, 60]}}, "morph.size: the scene is drawn for 40 x 60"),
+        ({"force": [{"kind": "wind", "by": [1, 0]}]}, "force: not allowed in a morph"),
+        ({"layer": [{"name": "a", "file": "left.png"}]}, "layer: not allowed in a morph"),
+        ({"density": [{"name": "ink"}]}, "density: not allowed in a morph"),
+        ({"tracks": {"points": [[1, 1]]}}, "tracks: not allowed in a morph"),
+        ({"effect": {"mask": "left.png"}}, "effect: not allowed in a morph"),
+        ({"time": {"substeps": 3}}, "time.substeps: not allowed in a morph"),
+        ({"time": {"loop": "pingpong"}}, "time.loop: not allowed in a morph: set pingpong"),
+        ({"keyframes": {**MOVES, "time": 1}}, "keyframes.time: not allowed in a morph"),
+        (
+            {"keyframes": {"move": [{**MOVES["move"][0], "time": 1}]}},
+            "keyframes.move.0.time: not allowed in a morph",
+        ),
+        ({"morph": {"fit": "stretch"}}, "to is missing: file of the second picture"),
+        (
+            {"morph": {"to": "other.png", "size": [40, 60]}},
+            "morph.size: 40 x 60 has another aspect than the picture",
+        ),
         ({"morph": {"to": "other.png", "size": [0, 60]}}, "expected positive numbers"),
         ({"morph": {"to": "other.png", "delay": 0.5}}, "morph: delay needs a timing mask"),
         ({"morph": {"to": "other.png", "warp_curve": [[3, 0.5]]}}, "times within the morph"),
@@ -315,21 +321,21 @@ CSV = {
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "where to? give at least one --move X0,Y0:X1,Y1, or --points FILE.csv"),
+        ((), "no points to move: give at least one --move X0,Y0:X1,Y1, or --points FILE.csv"),
         (("--points", "three.csv"), "three.csv:2: 3 columns; expected from x, from y, to x, to y"),
         (("--points", "far.csv"), "90,20: outside the picture of 60 x 40 pixels"),
         (("--points", "beyond.csv"), "the point 26,90 of the second picture lies outside it, 60 x 40"),
         (("--points", "above.csv", "B=tall.png"), "the point 26,3 of the second picture is cut off"),
         (("--points", "empty.csv"), "empty.csv: has no points"),
         (("--points", "titles.csv"), "titles.csv: has no points"),
-        (("--points", "timed.csv"), "a morph goes without: its points arrive at its end"),
+        (("--points", "timed.csv"), "not allowed in a morph: its points arrive at its end"),
         (("--points", "words.csv"), "words.csv:1: to y 'sixteen': expected a number"),
         (("--points", "no.csv"), "no.csv: no such file of points"),
         (("--points", "small.png"), "small.png"),
         (("--move", "20,20:26,16", "B=no.png"), "no.png: no such picture"),
         (("--move", "20,20:26,16", "B=points.csv"), "points.csv: not a picture that can be read"),
-        (("--move", "20,20:26,16@0.2"), "a morph goes without: its points arrive at its end"),
-        (("--move", "20,20:26"), "move '20,20:26': a point X,Y needs two numbers"),
+        (("--move", "20,20:26,16@0.2"), "not allowed in a morph: its points arrive at its end"),
+        (("--move", "20,20:26"), "move '20,20:26': a point X,Y is '26': expected two numbers"),
         (("--move", "20,20:26,16", "--pin", "20,20"), "pinned and moved"),
         (("--move", "20,20:26,16", "--pin", "70,20"), "70,20: outside the picture"),
         (("--move", "20,20:26,16", "--warp-curve", "fast"), "--warp-curve 'fast': expected"),
@@ -345,7 +351,7 @@ CSV = {
             ("--move", "20,20:26,16", "--blend-curve", "0.1:x"),
             "--blend-curve '0.1:x': a key: 'x' is not a number",
         ),
-        (("--move", "20,20:26,16", "--blend-curve", "0.1:1:2"), "'0.1:1:2' is not SECONDS:PART"),
+        (("--move", "20,20:26,16", "--blend-curve", "0.1:1:2"), "'0.1:1:2': expected SECONDS:PART"),
         (("--move", "20,20:26,16", "--fit", "cover"), "--fit 'cover': expected"),
         (("--move", "20,20:26,16", "--blend", "gamma"), "--blend 'gamma': expected"),
         (("--move", "20,20:26,16", "--timing", "left.png:0.95"), "--timing MASK:DELAY: 0.95: expected"),
@@ -381,7 +387,7 @@ def test_the_other_picture_is_not_written_over(folder, capsys):
     before = (folder / "other.png").read_bytes()
     arguments = ["morph", "small.png", "other.png", "--move", "20,20:26,16", *QUICK]
     assert main([*arguments, "-o", "a.gif", "--preview", "other.png"]) == 2
-    assert "other.png: that is a picture that is read" in capsys.readouterr().err
+    assert "other.png is an input of the scene" in capsys.readouterr().err
     assert (folder / "other.png").read_bytes() == before
 
 
@@ -437,5 +443,5 @@ def test_a_picture_that_folds_is_written_and_said(folder, capsys, monkeypatch):
     assert main(words) == 0
     monkeypatch.setattr(wfluid.cli.render, "match_keyframes", folded)
     assert main(words) == 1
-    assert "the picture folds over itself (det J -0.5)" in capsys.readouterr().err
+    assert "the picture folds, its smallest det J is -0.5" in capsys.readouterr().err
     assert (folder / "f.gif").exists()

@@ -193,7 +193,7 @@ def test_a_sequence_may_not_hold_the_input_nor_two_outputs_one_name(small, tmp_p
     assert result.returncode == 2 and "the picture itself" in result.stderr
     assert shot.read_bytes() == small.read_bytes()
     result = wfluid("animate", small, "-o", tmp_path / "a.gif", "--report", tmp_path / "a.gif", *PUSH, *QUICK)
-    assert result.returncode == 2 and "written as the picture" in result.stderr
+    assert result.returncode == 2 and "the output of 'picture'" in result.stderr
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

@@ -91,7 +91,7 @@ def leaves(value, path=()):
 def test_what_is_set_is_what_is_rendered(shots, capsys):
     options = ("--set", "time.duration=0.5", "--set", "time.fps=20", "--set", "frames.width=30", "--dry-run")
     assert render("shots/shot.toml", *options) == 0
-    assert "frames    11 of 30 x 20 pixels at 20 a second" in capsys.readouterr().out
+    assert "frames    11 of 30 x 20 pixels at 20 per second" in capsys.readouterr().out
 
 
 # Outputs

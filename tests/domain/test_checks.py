@@ -1,4 +1,4 @@
-"""Checks of what a user gives."""
+"""Checks of a user's values."""
 
 import pytest
 
@@ -7,13 +7,13 @@ from wfluid.pictures.formats import Encoding, PictureError
 from wfluid.system.errors import FileError
 
 
-def test_a_word_is_one_of_those_known():
+def test_known_words_are_accepted_and_others_refused():
     check_word("fit", "fill", ("fill", "fit"))
     with pytest.raises(ValueError, match=r"^fit 'full': expected one of fill, fit$"):
         check_word("fit", "full", ("fill", "fit"))
 
 
-def test_a_word_of_a_file_is_refused_as_one_of_it():
+def test_the_type_of_the_error_can_be_chosen():
     with pytest.raises(PictureError, match="type 'int': expected one of uint8"):
         Encoding(type="int")
     assert issubclass(PictureError, FileError)

@@ -1,4 +1,4 @@
-"""Curves of a morph begin at 0 and end at 1; a mask lets places be ahead of others."""
+"""Timing curves rise from 0 to 1; a mask lets some places start before others."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from wfluid.domain.piecewise import ease, hats, lerp_at
 PARTS = np.linspace(0, 1, 41)
 
 KEYED = {0.5: 0.2, 1.5: 0.9}
-"""Values by time, of a morph of 2 s."""
+"""Keys of a morph of 2 s: progress by time [s]."""
 
 CURVES = {
     "linear": lambda s: s,
@@ -24,20 +24,20 @@ def curve(name):
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_a_curve_is_what_its_formula_says(name):
+def test_a_curve_equals_its_formula(name):
     np.testing.assert_allclose(curve(name).at(PARTS), CURVES[name](PARTS), rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_a_curve_begins_at_0_and_ends_at_1_to_the_bit_and_never_goes_back(name):
-    """Before its time and after it stays what it is at the ends."""
+def test_a_curve_is_monotonic_from_exactly_0_to_exactly_1(name):
+    """Before the start and after the end the curve is constant."""
     at = curve(name).at(np.array([-1.0, 0.0, 1.0, 3.0]))
     np.testing.assert_array_equal(at, [0, 0, 1, 1])
     assert np.all(np.diff(curve(name).at(PARTS)) > 0)
 
 
-def test_ease_starts_and_stops_softly_and_is_its_own_mirror():
-    """No speed at both ends, 3/2 in the middle; at(s) + at(1 - s) = 1."""
+def test_ease_has_no_speed_at_the_ends_and_is_symmetric():
+    """The slope is 0 at both ends and 3/2 in the middle; at(s) + at(1 - s) = 1."""
     ease, h = curve("ease"), 1e-6
     at = ease.at(np.array([h, 1 - h, 0.5 - h, 0.5 + h]))
     assert at[0] / h < 1e-5 and (1 - at[1]) / h < 1e-5
@@ -51,7 +51,7 @@ def test_an_eased_curve_with_keys_stops_at_each_of_them():
     np.testing.assert_allclose(eased.at(np.array([0.25 - h, 0.25 + h])), 0.5, atol=1e-8)
 
 
-def test_one_number_and_an_array_are_taken_alike():
+def test_numbers_and_arrays_give_the_same_values():
     parts = PARTS.reshape(1, -1)
     for name in CURVES:
         values = curve(name).at(parts)
@@ -59,8 +59,8 @@ def test_one_number_and_an_array_are_taken_alike():
         assert [float(curve(name).at(part)) for part in PARTS] == values.ravel().tolist()
 
 
-def test_keys_may_jump_nearly_and_name_the_ends():
-    """A value for the start and one for the end are those that are needed."""
+def test_keys_may_be_close_together_and_include_the_ends():
+    """Keys at the start and at the end replace the default ones."""
     assert curve_of({0.0: 0.0, 1.0: 0.3, 2.0: 1.0}, 2.0) == curve_of({1.0: 0.3}, 2.0)
     kept = Curve(((0, 0), (1, 1)))
     assert curve_of(kept, 5.0) is kept
@@ -81,27 +81,27 @@ def test_keys_may_jump_nearly_and_name_the_ends():
         ({2.0: 0.5}, "expected 0 at the start and 1 at the end"),
     ],
 )
-def test_what_is_no_curve_is_refused(what, says):
+def test_invalid_curves_are_refused(what, says):
     with pytest.raises(ValueError, match=says):
         curve_of(what, 2.0)
 
 
 @pytest.mark.parametrize("keys", [(), ((0, 0), (0.5, 0.2), (0.5, 0.4), (1, 1)), ((1, 1), (0, 0)), ((0, 0),)])
-def test_keys_that_are_none_are_refused(keys):
+def test_invalid_keys_are_refused(keys):
     with pytest.raises(ValueError, match="a curve's keys"):
         Curve(keys)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.3, DELAY_LIMIT])
 def test_white_is_ahead_of_black_by_the_delay(delay):
-    """What white sees after a part s, black sees after s + delay; both take 1 - delay of the time."""
+    """White at time s equals black at time s + delay; both take 1 - delay of the duration."""
     white, black = (delayed_part(PARTS, np.float64(one), delay) for one in (1, 0))
     np.testing.assert_allclose(white, np.minimum(PARTS / (1 - delay), 1), atol=1e-12)
     np.testing.assert_allclose(delayed_part(PARTS + delay, np.float64(0), delay), white, atol=1e-12)
     assert np.all(white >= black) and black[0] == white[0] == 0 and black[-1] == white[-1] == 1
 
 
-def test_grey_is_between():
+def test_grey_lies_between_white_and_black():
     ahead = np.array([[0.0, 0.25], [0.5, 1.0]])
     begins, ends = 0.4 * (1 - ahead), 0.4 * (1 - ahead) + 0.6
     for part in PARTS:
@@ -110,12 +110,12 @@ def test_grey_is_between():
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0])
-def test_without_a_delay_a_mask_says_nothing(value):
+def test_without_a_delay_a_mask_has_no_effect(value):
     np.testing.assert_array_equal(delayed_part(PARTS, np.full(PARTS.shape, value), 0.0), PARTS)
 
 
-def test_lines_between_samples_end_at_them():
-    """Constant before the first and after the last; hats are the weights of the same lines."""
+def test_linear_interpolation_passes_through_the_samples():
+    """Interpolation is constant before the first and after the last sample; hats are its weights."""
     times, values = (0.5, 1.0, 3.0), (2.0, -1.0, 4.0)
     for t in (-1.0, 0.5, 0.7, 1.0, 2.9, 3.0, 9.0):
         assert lerp_at(times, values, t) == pytest.approx(np.interp(t, times, values), abs=1e-15)
@@ -124,7 +124,7 @@ def test_lines_between_samples_end_at_them():
     assert lerp_at((1.0,), (5.0,), 0.0) == 5.0
 
 
-def test_a_ramp_is_level_at_both_ends():
+def test_a_ramp_has_no_slope_at_both_ends():
     s = np.array([0.0, 0.5, 1.0])
     np.testing.assert_array_equal(ease(s), [0.0, 0.5, 1.0])
     assert ease(1e-4) < 3.1e-8 and 1 - ease(1 - 1e-4) < 3.1e-8

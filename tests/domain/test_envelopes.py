@@ -1,4 +1,4 @@
-"""Envelopes integrate exactly, however the time is cut, alone and multiplied."""
+"""Envelopes and their products integrate exactly over steps of any length."""
 
 import itertools
 import math
@@ -26,7 +26,7 @@ ENVELOPES = {
 
 
 def value(name, t):
-    """The same courses, written as plain functions of time."""
+    """The same envelopes, written as plain functions of time."""
     if name == "constant":
         return np.where((t >= 0.2) & (t < 1.3), 1.0, 0.0)
     if name == "samples":
@@ -45,8 +45,8 @@ def value(name, t):
     if name == "twice the fade in a window":
         return np.where((t >= 0.4) & (t < 1.1), 2 * value("fade", t), 0.0)
     s = t - 0.3
-    course = 0.7 * np.cos(2 * np.pi * s / 0.9) * np.where(s < 0.45, 0.5, 1.0)
-    return np.where((t >= 0.3) & (t < 1.7), course, 0.0)
+    factor = 0.7 * np.cos(2 * np.pi * s / 0.9) * np.where(s < 0.45, 0.5, 1.0)
+    return np.where((t >= 0.3) & (t < 1.7), factor, 0.0)
 
 
 @pytest.mark.parametrize("name", ENVELOPES)
@@ -59,7 +59,7 @@ def test_integrals_equal_fine_quadrature(name, start, end):
 
 @given(st.floats(-0.5, 2.5), st.lists(st.floats(0, 2), min_size=1, max_size=6))
 def test_impulses_of_steps_add_up(at, cuts):
-    """However the time is cut into steps, a blow strikes once and integrals add."""
+    """For any steps, an instant acts once and integrals add up."""
     edges = [0.0, *sorted(cuts), 2.0]
     for envelope in (*ENVELOPES.values(), Instantaneous(at)):
         parts = sum(envelope.integral(a, b) for a, b in itertools.pairwise(edges))
@@ -75,15 +75,15 @@ def test_a_function_is_integrated_to_fourth_order():
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.9), errors
 
 
-def test_a_value_is_the_slope_of_the_integral():
-    """d/dt of the integral over a short time, at times away from the breaks."""
+def test_a_value_is_the_derivative_of_the_integral():
+    """The derivative of the integral by differences, away from the breaks."""
     for name, envelope in ENVELOPES.items():
         for t in (0.237, 0.551, 0.93, 1.409, 1.93):
             slope = envelope.integral(t - 1e-4, t + 1e-4) / 2e-4
             assert envelope.value(t) == pytest.approx(slope, abs=1e-5), (name, t)
 
 
-def test_a_blow_takes_the_value_of_what_it_is_multiplied_by():
+def test_an_instant_takes_the_value_of_the_other_factors_at_its_time():
     blow = Instantaneous(0.45) * Oscillator(amplitude=1.5, period=0.7, centred=False) * 3
     assert blow.integral(0.4, 0.5) == pytest.approx(3 * value("cosine", 0.45))
     assert blow.integral(0.5, 0.6) == 0

@@ -1,4 +1,4 @@
-"""First derivatives of what forces do over a step: equal to differences, for every number that may vary."""
+"""Derivatives of the effect of forces over a step equal differences, for every parameter that may vary."""
 
 import math
 import re
@@ -24,13 +24,13 @@ from wfluid.model.stroke import Stroke
 from wfluid.model.uniform_forces import Buoyancy, Wind
 
 STEP = 3e-4
-"""Of the differences: their error, STEP^4 / 30 times a fifth derivative (below 3e7), is below 9e-9; the
+"""Tolerance of differences: their error, STEP^4 / 30 times a fifth derivative (below 3e7), is below 9e-9; the
 rounding of a value below 10, 1.5 eps value / STEP, is below 2e-11."""
 
 TOLERANCE = 1e-8
 
 STEPS = {
-    "the whole": (0.0, 2.0),
+    "the entire window": (0.0, 2.0),
     "the beginning": (0.15, 0.45),
     "the half period": (0.55, 0.95),
     "the end": (1.25, 1.9),
@@ -39,16 +39,16 @@ STEPS = {
     "before": (-1.0, -0.4),
     "after": (2.2, 2.9),
 }
-"""What a step contains of a centred oscillator from 0.3 to 1.7 s with a period of 0.65 … 0.95 s."""
+"""Steps with different parts of a centred oscillator from 0.3 to 1.7 s with a period of 0.65 … 0.95 s."""
 
 
 def inner(thing, name):
-    """The attribute, or the entry of a tuple, of a name."""
+    """The attribute, or the entry of a tuple, with a name."""
     return thing[int(name)] if name.isdigit() else getattr(thing, name)
 
 
 def changed(thing, names, index, by):
-    """The same with the number that the names lead to, or its entry, changed."""
+    """A copy in which the parameter at a path of names, or one of its entries, is changed."""
     if not names:
         values = np.array(thing, dtype=np.float64)
         values[index] += by
@@ -60,7 +60,7 @@ def changed(thing, names, index, by):
 
 
 def differences(function, thing, path):
-    """Of fourth order: the derivative of function(thing) with respect to each number at a path."""
+    """The derivative of function(thing) by each parameter at a path, by differences of fourth order."""
     names = re.findall(r"\w+", path)
     out = np.zeros(np.shape(reduce(inner, names, thing)))
     for index in np.ndindex(out.shape):
@@ -73,7 +73,7 @@ def differences(function, thing, path):
 
 
 def assert_slopes(got, names, function, thing):
-    """The names are all there, and each has its number's shape and derivative."""
+    """All names are present, each with its parameter's shape and derivative."""
     assert set(got) == set(names)
     for name, slope in got.items():
         expected = differences(function, thing, name)
@@ -99,7 +99,7 @@ def samples(random):
 
 
 def faded():
-    """A break 0.1 s after the oscillator begins: no piece of the time is a whole number of quarters."""
+    """A break 0.1 s after the start of the oscillator: no piece is a multiple of a quarter period."""
     return Fade(rise=0.2, fall=0.5, start=0.2, end=1.8)
 
 
@@ -164,23 +164,23 @@ def test_value_slopes_of_an_envelope_are_those_of_its_value(name):
 @given(st.lists(st.floats(0, 2), max_size=4))
 @pytest.mark.parametrize("name", ENVELOPES)
 def test_slopes_of_steps_add_up(name, cuts):
-    """However the time is cut into steps, also where the value jumps: each jump moves in one step."""
+    """For any steps, also with jumps of the value: each jump counts in one step."""
     envelope = ENVELOPES[name][0](np.random.default_rng(0))
     jumps = [t for t, _, _ in envelope.jumps(0.0, 2.0)]
     edges = sorted([0.0, *cuts, *jumps, 2.0])
-    whole = envelope.slopes(0.0, 2.0)
-    for key, slope in whole.items():
+    total = envelope.slopes(0.0, 2.0)
+    for key, slope in total.items():
         parts = sum(envelope.slopes(a, b)[key] for a, b in pairwise(edges))
         np.testing.assert_allclose(parts, slope, atol=TOLERANCE, err_msg=key)
 
 
-def test_a_function_is_not_asked_outside_the_window_it_is_multiplied_by():
+def test_a_function_is_not_called_outside_the_window_that_multiplies_it():
     arch = Constant(1.0, 2.0) * Arbitrary(lambda t: math.sqrt((t - 1) * (2 - t))) * Oscillator(centred=False)
     assert not any(arch.slopes(2.5, 3.0).values())
     assert all(arch.slopes(0.5, 2.5).values())
 
 
-def test_an_envelope_of_ones_own_has_no_slopes():
+def test_an_envelope_of_a_user_has_no_slopes():
     class Ramp(Envelope):
         def value(self, t):
             return t
@@ -205,13 +205,13 @@ CENTERS = {
     "a function": (lambda random: lambda t: (t, 1 - t), []),
 }
 
-COURSES = {
+FORCE_ENVELOPES = {
     "constant": (lambda random: Constant(0.2, 1.3), []),
     "centred": (centred, [f"envelope.{name}" for name in WAVE]),
     "all": (ENVELOPES["all"][0], [f"envelope.{name}" for name in ENVELOPES["all"][1]]),
 }
 
-BLOBS = {
+GAUSSIANS = {
     "push": (GaussianForce, "vector"),
     "vortex": (VortexForce, "spin"),
     "growth": (Growth, "rate"),
@@ -220,13 +220,17 @@ BLOBS = {
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
 @pytest.mark.parametrize("center", CENTERS)
-@pytest.mark.parametrize("kind", BLOBS)
-def test_a_gaussian_pulls_back_through_its_blob(kind, center, course, step):
-    """With random weights of all numbers of the blob, the gradient of their sum."""
+@pytest.mark.parametrize("kind", GAUSSIANS)
+def test_a_gaussian_pulls_back_through_its_impulse(kind, center, timing, step):
+    """With random weights of all entries of the impulse, the gradient of their sum."""
     random = np.random.default_rng([len(kind), len(center), len(step)])
-    (make, name), (place, center_names), (envelope, names) = BLOBS[kind], CENTERS[center], COURSES[course]
+    (make, name), (place, center_names), (envelope, names) = (
+        GAUSSIANS[kind],
+        CENTERS[center],
+        FORCE_ENVELOPES[timing],
+    )
     number = random.uniform(-2, 2, 2) if name == "vector" else random.uniform(-2, 2)
     force = make(place(random), number, random.uniform(0.1, 0.3), envelope(random))
     bar, (start, end) = random_blob(random), STEPS[step]
@@ -239,22 +243,22 @@ def test_a_gaussian_pulls_back_through_its_blob(kind, center, course, step):
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
-def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(course, step):
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
+def test_a_stroke_pulls_back_to_its_strength_radius_and_envelope(timing, step):
     random = np.random.default_rng(len(step))
     path = Path((0.2, 0.5, 0.61, 1.4), random.uniform(size=(4, 2)))
-    stroke = Stroke(path, 0.2, random.uniform(0.5, 1.5), COURSES[course][0](random))
+    stroke = Stroke(path, 0.2, random.uniform(0.5, 1.5), FORCE_ENVELOPES[timing][0](random))
     bar, (start, end) = random_blob(random), STEPS[step]
     assert_slopes(
         stroke.pull_back(start, end, bar),
-        ["strength", "radius", *COURSES[course][1]],
+        ["strength", "radius", *FORCE_ENVELOPES[timing][1]],
         lambda changed: numbers(bar) @ numbers(changed.impulse(start, end)),
         stroke,
     )
 
 
 def buoyant(force, start, end):
-    """What each component of the vector times the density adds."""
+    """The contribution of each component of the vector times the density."""
     return np.multiply(force.vector, force.envelope.integral(start, end))
 
 
@@ -272,27 +276,27 @@ FIELDS = {
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
 @pytest.mark.parametrize("kind", FIELDS)
-def test_a_field_pulls_back_through_its_integrals(kind, course, step):
+def test_a_field_pulls_back_through_its_integrals(kind, timing, step):
     random, (make, integrals, names) = np.random.default_rng(len(step)), FIELDS[kind]
-    force = make(random, COURSES[course][0](random))
+    force = make(random, FORCE_ENVELOPES[timing][0](random))
     bar = random.normal(size=np.shape(integrals(force, *STEPS[step])))
     assert_slopes(
         force.pull_back(*STEPS[step], bar),
-        [*names, *COURSES[course][1]],
+        [*names, *FORCE_ENVELOPES[timing][1]],
         lambda changed: bar @ integrals(changed, *STEPS[step]),
         force,
     )
 
 
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("course", COURSES)
-def test_a_painted_source_pulls_back_to_its_envelope(course, step):
-    source = PaintedSource(Painted(RAMP), COURSES[course][0](np.random.default_rng(1)))
+@pytest.mark.parametrize("timing", FORCE_ENVELOPES)
+def test_a_painted_source_pulls_back_to_its_envelope(timing, step):
+    source = PaintedSource(Painted(RAMP), FORCE_ENVELOPES[timing][0](np.random.default_rng(1)))
     assert_slopes(
         source.pull_back(*STEPS[step], -0.7),
-        COURSES[course][1],
+        FORCE_ENVELOPES[timing][1],
         lambda changed: -0.7 * changed.envelope.integral(*STEPS[step]),
         source,
     )

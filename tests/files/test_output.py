@@ -1,4 +1,4 @@
-"""Animations as files: names, numbers, delays, wholeness."""
+"""Animations as files: names, numbers, delays, atomic writing."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def write(path, count, fps):
 
 
 def gif_delays(data):
-    """Delays [1/100 s] read by walking the blocks, written again for the test."""
+    """Delays [1/100 s], read by an independent parser of the blocks."""
     at, found = 13 + (3 << (data[10] & 7) + 1 if data[10] & 0x80 else 0), []
     while data[at] != 0x3B:
         if data[at] == 0x21 and data[at + 1] == 0xF9:
@@ -47,8 +47,8 @@ def gif_delays(data):
 
 @pytest.mark.parametrize("fps", [10, 12, 15, 23.976, 24, 25, 30, 50])
 @pytest.mark.parametrize("count", [1, 7, 49])
-def test_gif_delays_are_whole_and_their_mean_is_exact(fps, count):
-    """15 fps is 70, 60, 70 … ms; the sum is never off by more than half of 1/100 s."""
+def test_gif_delays_are_integers_with_an_exact_mean(fps, count):
+    """15 fps is 70, 60, 70 … ms; the sum is exact to 1/200 s."""
     spread = delays(count, fps)
     assert len(spread) == count and min(spread) >= 2
     assert max(spread) - min(spread) <= 1

@@ -1,4 +1,4 @@
-"""Tables of points: read however they are separated, and refused with the line that is wrong."""
+"""Tables of points are read with any separator; invalid lines are refused with their number."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ ROWS = "172,115.5,155,-2e0\n1,2,3,4\n"
 
 @pytest.fixture
 def read(tmp_path):
-    """Reads what a file would hold; its name is points.csv."""
+    """Reads points from a text, written to points.csv."""
 
     def read(content):
         path = tmp_path / "points.csv"
@@ -34,7 +34,7 @@ def places(rows):
 @pytest.mark.parametrize("header", ["", HEADER])
 @pytest.mark.parametrize("start", ["", "\ufeff"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_a_table_is_read_however_it_is_written(read, separator, header, start, end):
+def test_a_table_is_read_with_any_separator(read, separator, header, start, end):
     rows = read(start + (header + ROWS).replace(",", separator).replace("\n", end))
     assert places(rows) == PLACES
     first = 2 if header else 1
@@ -55,13 +55,13 @@ def test_blank_lines_comments_and_empty_cells_are_skipped_but_counted(read):
     assert [(row.line, row.source) for row in rows] == [(7, (1.0, 2.0)), (9, (5.0, 6.0))]
 
 
-def test_fields_may_be_quoted_and_have_spaces_around(read):
+def test_fields_may_be_quoted_and_surrounded_by_spaces(read):
     rows = read('"left, x" ; "y" ;u;v\n "1" ; " 2 ";3  ;\t4')
     assert places(rows) == [((1.0, 2.0), (3.0, 4.0))]
 
 
-def test_names_may_have_what_separates_in_other_files(read):
-    """The separator is what makes four or five columns."""
+def test_names_of_columns_may_contain_other_separators(read):
+    """The separator is the one that gives four or five columns."""
     rows = read("x, from;y, from;x, to;y, to\n1;2;3;4")
     assert places(rows) == [((1.0, 2.0), (3.0, 4.0))]
 
@@ -100,11 +100,11 @@ WRONG = {
     b"\x89PNG\r\n\x1a\n\xff": " cannot be read (no UTF-8 text)",
     "1,2,3,4".encode("utf-16"): " cannot be read (no UTF-8 text)",
 }
-"""By a file's content: what its refusal says after its name."""
+"""Contents of invalid files, and the message after the file's name."""
 
 
 @pytest.mark.parametrize("content", WRONG, ids=lambda content: repr(content[:24]))
-def test_what_is_wrong_is_said_in_one_line_with_its_place(read, tmp_path, content):
+def test_an_invalid_line_is_refused_with_its_number(read, tmp_path, content):
     with pytest.raises(FileError) as refusal:
         read(content)
     message = str(refusal.value)
@@ -112,7 +112,7 @@ def test_what_is_wrong_is_said_in_one_line_with_its_place(read, tmp_path, conten
     assert "\n" not in message and len(message) < len(str(tmp_path)) + 200
 
 
-def test_a_file_that_is_not_there_or_is_a_folder_is_refused(tmp_path):
+def test_a_missing_file_or_a_folder_is_refused(tmp_path):
     with pytest.raises(FileError, match=r"none\.csv: no such file of points$"):
         read_points(tmp_path / "none.csv")
     with pytest.raises(FileError, match=r": cannot be read \(Is a directory\)$"):

@@ -47,8 +47,9 @@ from wfluid.fields.state import State
 from wfluid.gradient.checkpoints import even_segments, least_room
 from wfluid.gradient.functional import Functional
 from wfluid.gradient.objectives import Effort, ParticleMisfit
-from wfluid.gradient.recording import MEGABYTE, WORKING_STATES
+from wfluid.gradient.recording import MEGABYTE
 from wfluid.gradient.state_objectives import DensityMisfit, MapMisfit
+from wfluid.gradient.step_loops import WORKING_STATES
 from wfluid.gradient.variables import Free
 from wfluid.step.tape import record, recording
 
@@ -206,7 +207,10 @@ def test_memory_is_what_the_schedule_says(device, case, steps):
     timeline = Timeline(steps / 48, fps=48, substeps=1)
     case = loosely(case, objective=ParticleMisfit(PARTICLES.points, PARTICLES.destinations, steps / 48))
     functional = case.functional(device, timeline=timeline)
-    densities, coupled = len(case.fluid.get("densities", ())), functional._recording.step.medium is not None
+    densities, coupled = (
+        len(case.fluid.get("densities", ())),
+        functional._recording.step.coefficients is not None,
+    )
     cells = functional._recording.step.layout.size
     numbers = (4 + densities + coupled) * cells + 2 * len(PARTICLES.points)
     each = numbers * np.dtype(wp.dtype_to_numpy(Real)).itemsize
@@ -260,11 +264,11 @@ def test_a_replay_follows_a_viscosity_that_asks_for_other_solves(device, name):
     used, fresh = case.functional(device), case.functional(device)
     of_viscosity, thick = used.variables.slices[0], used.start.copy()
     thick[of_viscosity.entries] += np.log(times) / of_viscosity.scale
-    first, plan = used.value_and_gradient(used.start), used._recording._plan
-    found, other_plan = used.value_and_gradient(thick), used._recording._plan
+    first, plan = used.value_and_gradient(used.start), used._recording.loops.methods
+    found, other_plan = used.value_and_gradient(thick), used._recording.loops.methods
     assert plan != other_plan
     assert_same(found, fresh.value_and_gradient(thick))
-    assert fresh._recording._plan == other_plan
+    assert fresh._recording.loops.methods == other_plan
     assert_same(used.value_and_gradient(used.start), first)
     assert_same(used.value_and_gradient(thick), found)
 
@@ -307,7 +311,7 @@ def test_two_threads_compute_the_bits_of_one(device, monkeypatch, name):
         functional = Functional(
             LARGE, fluid, forces, FOUR_STEPS, objective, [Free(one) for one in free], device=str(device)
         )
-        assert (functional._recording._pool is not None) == (least == 0)
+        assert (functional._recording.loops.pool is not None) == (least == 0)
         found.append([functional.value_and_gradient(some_way_off(functional)) for _ in range(2)])
     (two, again), (one, _) = found
     assert_same(two, one)

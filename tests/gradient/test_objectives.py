@@ -18,7 +18,7 @@ from wfluid import (
     WarpObjective,
 )
 from wfluid.gradient.objectives import Sum, terms_of
-from wfluid.gradient.recording import Recording
+from wfluid.gradient.step_loops import StepLoops
 
 GRID = Grid(17, 12, 1.0, 0.7)
 FORCES = [GaussianForce((0.4, 0.3), (1.5, 0.5), 0.12)]
@@ -121,7 +121,7 @@ def test_a_warp_objective_that_launches_nothing_is_refused(make):
         functional.value(functional.start)
 
 
-@pytest.mark.parametrize("interrupted", ["_record", "_play_back"])
+@pytest.mark.parametrize("interrupted", ["record_forward", "record_backward"])
 def test_an_interrupted_capture_is_made_up_for(make, monkeypatch, interrupted):
     """A stiffer fluid asks for other solves; interrupted there, the next evaluation captures them anew."""
     fluid = Fluid(viscosity=0.01, diffusion_tolerance=1e-4)
@@ -129,11 +129,11 @@ def test_an_interrupted_capture_is_made_up_for(make, monkeypatch, interrupted):
     functional.value_and_gradient(functional.start)
     stiff = functional.start + np.log(300)
 
-    def stop(recording):
+    def stop(loops):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(Recording, interrupted, stop)
+        patch.setattr(StepLoops, interrupted, stop)
         with pytest.raises(KeyboardInterrupt):
             functional.value_and_gradient(stiff)
     found, expected = functional.value_and_gradient(stiff), make(MISFIT, fluid, ["fluid.viscosity"])
@@ -146,6 +146,6 @@ def test_where_something_is_frozen_solves_go_to_a_tolerance_that_gradients_can_r
     """Conjugate gradients are their own transpose only as far as they go: here to 1e-4 at least."""
     freeze = Freeze((np.arange(17) > 11)[None, :] * np.ones((12, 1)))
     functional = make(MISFIT, Fluid(viscosity=0.01, freeze=freeze))
-    diffusion, projection, *_ = functional._recording._plan
+    diffusion, projection, *_ = functional._recording.loops.methods
     assert projection.name == "conjugate gradients" and projection.tolerance <= 1e-4
     assert diffusion.name != "conjugate gradients" or diffusion.tolerance <= 1e-4

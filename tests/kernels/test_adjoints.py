@@ -185,7 +185,7 @@ def test_scatter_adds_what_numpy_adds(device, kind, size, places):
 def projecting(device, walls="free-slip", **fluid):
     """A step of DT, ready."""
     step = Step(GRID, Fluid(walls=walls, **fluid), device)
-    step.plan(DT, DT, step.follow_medium)
+    step.plan(DT, DT, step.update_coefficients)
     step.allow_gradients()
     return step
 
@@ -245,7 +245,7 @@ def test_the_projection_is_transposed(device, name, walls):
         def prescribe_adjoint(self, minus_b_bar):
             self.minus_bar = wp.clone(minus_b_bar)
 
-    out, prescribed, projection.keeps_pressure = vector(LAYOUT, device, 2), Prescribed(), True
+    out, prescribed, projection.accumulates_pressure = vector(LAYOUT, device, 2), Prescribed(), True
     ask((*out, projection.q), (*y, q_bar))
     with taped(x) as tape:
         projection.project(x, out, prescribed)
@@ -271,13 +271,13 @@ def test_taking_the_pressure_so_far_off_and_adding_it_again_is_transposed(device
     step = projecting(device, walls, viscosity=media(GRID)["smooth"][0])
     ghosts = step.velocity_ghosts
     impulses = Forcing((), step.fluid, GRID, device)
-    impulses.set((), step.fluid, 0.0, DT, DT, kept=0.7)
+    impulses.set((), step.fluid, 0.0, DT, DT, pressure_part=0.7)
     (q,) = noise(LAYOUT, device, 1, 5, Ghosts(LAYOUT, step.fluid.walls.centre_rules(), device))
     v, y = noise(LAYOUT, device, 2, 6, *ghosts), noise(LAYOUT, device, 2, 7, *ghosts)
     (out_q,) = vector(LAYOUT, device, 1)
     step.projection.q.zero_()
     (q_bar,) = noise(LAYOUT, device, 1, 8)
-    ask((*step.projection.pressed, out_q), (*y, q_bar))
+    ask((*step.projection.without_pressure, out_q), (*y, q_bar))
     with taped((*v, q)) as tape:
         out = step.projection.subtract_pressure(v, q, impulses)
         step.projection.add_pressure(q, impulses, out_q)

@@ -40,12 +40,12 @@ def cases(names):
 
 
 GOOD = 0.25
-"""Residual that is good enough [px]."""
+"""Tolerance for residuals [px]."""
 
 
 @cache
 def matched(name, device):
-    """The match of a case, found once."""
+    """A function that searches for the match of a case once."""
     return CASES[name].match(device)
 
 
@@ -69,7 +69,7 @@ def steps_of(match):
 
 @cases(CASES)
 def test_keyframes_are_reached_without_a_fold(match_of, name):
-    """Every particle at its destination, every destination showing its point; det J > 0 in all frames."""
+    """Particles reach their destinations, the map leads back to their points; det J > 0 in all frames."""
     case, match = CASES[name], match_of(name)
     assert match.status == REACHED
     residuals = [SIDE * arrival.residual for arrival in match.arrivals]
@@ -84,8 +84,8 @@ def test_keyframes_are_reached_without_a_fold(match_of, name):
 
 
 @pytest.mark.parametrize("name", ["a path, one pinned", "not square"])
-def test_arrivals_are_those_of_the_animation_run_again(match_of, name):
-    """What `Animation` shows on its own: where points are, what the map shows, the extremes of det J."""
+def test_arrivals_are_those_of_another_run_of_the_animation(match_of, name):
+    """Positions of points, sources and extremes of det J of an independent run of `Animation`."""
     match = match_of(name)
     places = list(dict.fromkeys(arrival.keyframe.point for arrival in match.arrivals))
     frames = list(replace(match.animation, points=places).frames())
@@ -104,8 +104,8 @@ def test_arrivals_are_those_of_the_animation_run_again(match_of, name):
 
 
 @pytest.mark.parametrize("name", ["one arrow", "a smile", "opposite, side by side", "a swap", "periodic"])
-def test_points_are_on_their_ways_all_the_time(match_of, name):
-    """They set out at once and do not rush at the end: never far from where the plan has them."""
+def test_points_stay_near_their_planned_ways(match_of, name):
+    """Points are near their planned positions at all times: no late start, no rush at the end."""
     match = match_of(name)
     timeline, grid = match.animation.timeline, match.animation.grid
     particles = targets_of(CASES[name].keyframes, (), (grid.width, grid.height), timeline.end)
@@ -124,7 +124,7 @@ def dots(places, height, spread=1.5):
 
 
 def centroid(picture, near, reach=8):
-    """Where the light around a place is [px], by its first moments."""
+    """Centroid of the light around a place [px]."""
     values = picture.pixels[..., 0].astype(np.float64)
     x, y = np.arange(values.shape[1]) + 0.5, (np.arange(values.shape[0]) + 0.5)[:, None]
     values = np.where(np.hypot(x - SIDE * near[0], y - SIDE * near[1]) < reach, values, 0)
@@ -132,8 +132,8 @@ def centroid(picture, near, reach=8):
 
 
 @pytest.mark.parametrize("name", ["one arrow", "a smile", "not square", "a path, one pinned", "periodic"])
-def test_a_dot_painted_at_a_point_is_seen_at_its_keyframes(match_of, name):
-    """The picture itself is the oracle: a dot's centroid in the frame rendered at the time."""
+def test_a_dot_painted_at_a_point_appears_at_its_keyframes(match_of, name):
+    """The oracle is the rendered frame: the centroid of a dot at the keyframe's time."""
     match = match_of(name)
     points = list(dict.fromkeys(arrival.keyframe.point for arrival in match.arrivals))
     pictures = [
@@ -147,7 +147,7 @@ def test_a_dot_painted_at_a_point_is_seen_at_its_keyframes(match_of, name):
 
 
 def velocity_at(state, places):
-    """Between the faces, by SciPy's cubic splines; places well within the picture."""
+    """The velocity between faces by SciPy's cubic splines, for places inside the picture."""
     grid = state.grid
     (u, v), (x, y) = state.velocity, (places / (grid.hx, grid.hy)).T
     return np.stack(
@@ -156,7 +156,7 @@ def velocity_at(state, places):
 
 
 @cases(["one arrow", "crossing", "a third of the picture", "no-slip"])
-def test_particles_traced_by_another_hand_arrive(match_of, device_name, name):
+def test_particles_traced_by_an_independent_integrator_arrive(match_of, device_name, name):
     """dx/dt = v(x, t): classical Runge-Kutta steps through the solver's fields, each kept for a step."""
     match = match_of(name)
     animation, timeline = match.animation, match.animation.timeline
@@ -180,8 +180,8 @@ def test_particles_traced_by_another_hand_arrive(match_of, device_name, name):
 
 
 @cases(["pins around", "a path, one pinned"])
-def test_pins_stay_where_they_are_all_the_time(match_of, name):
-    """Within 1.5 px at every step until the last keyframe, not at keyframes only."""
+def test_pins_stay_in_place_until_the_last_keyframe(match_of, name):
+    """Within 1.5 px at every step until the last keyframe, not only at keyframes."""
     match = match_of(name)
     pins = np.array(CASES[name].pins)
     strayed = SIDE * np.linalg.norm(match.tracks[:, -len(pins) :] - pins, axis=2)
@@ -189,8 +189,8 @@ def test_pins_stay_where_they_are_all_the_time(match_of, name):
     assert sum(arrival.pinned for arrival in match.arrivals) == len(pins) * len(set(steps_of(match)))
 
 
-def test_only_what_is_free_of_the_users_forces_varies(match_of):
-    """No force is added; numbers that are not free are those given, to the bit."""
+def test_only_free_parameters_of_the_users_forces_vary(match_of):
+    """No force is added; parameters that are not free stay bit-equal."""
     case, match = CASES["the user's own forces"], match_of("the user's own forces")
     assert match.found == () and len(match.animation.forces) == 2
     (one, other), (given, same) = match.animation.forces, case.forces
@@ -199,7 +199,7 @@ def test_only_what_is_free_of_the_users_forces_varies(match_of):
 
 
 def test_the_users_forces_act_beside_those_found(match_of, device_name):
-    """An animation with forces of its own keeps them, in front; the arrows arrive all the same."""
+    """An animation's own forces are kept, before the forces found; all keyframes are reached."""
     wind = CASES["the user's own forces"].forces[1]
     match = Case(arrows=[ARROW], forces=[wind], cells=64, duration=0.5).match(device_name)
     assert match.status == REACHED and match.animation.forces == (wind, *match.found)
@@ -213,13 +213,13 @@ def test_the_same_seed_finds_the_same_bits(match_of, device_name):
 
 
 def numbers_of(match):
-    """All that was found, as one vector."""
+    """All parameters found, as one vector."""
     return np.array([[*force.vector, *force.center, force.radius] for force in match.found]).ravel()
 
 
 @pytest.mark.long
 def test_points_pass_one_another_on_the_side_that_the_seed_chooses(device_name):
-    """A swap, stopped when the march is through: turned round by another seed, both points to their side."""
+    """Two points that swap, stopped after the march: another seed sends both to the other side."""
     swap, sides = replace(CASES["a swap"], cells=48, duration=0.5), {}
     for seed in range(4):
         match = swap.match(device_name, seed=seed, progress=lambda progress: progress.stage != "march")
@@ -232,8 +232,8 @@ def test_points_pass_one_another_on_the_side_that_the_seed_chooses(device_name):
         assert all(np.array_equal(numbers, found[0]) for numbers in found)
 
 
-def test_a_search_goes_on_from_forces_found_before(match_of, device_name):
-    """With an arrow more: fewer evaluations than from nothing, both arrive, the old one has no new force."""
+def test_a_search_resumes_from_forces_found_before(match_of, device_name):
+    """With one more arrow: fewer evaluations than from no forces, both arrive, none is added for the old."""
     before = match_of("one arrow")
     case = replace(CASES["one arrow"], arrows=PAIR)
     match, anew = case.match(device_name, start=before.found), case.match(device_name)
@@ -245,7 +245,7 @@ def test_a_search_goes_on_from_forces_found_before(match_of, device_name):
     assert max(distances) < 0.2
 
 
-def test_a_search_that_starts_at_its_end_stays_there(match_of, device_name):
+def test_a_search_that_starts_at_its_result_keeps_it(match_of, device_name):
     before = match_of("one arrow")
     match = CASES["one arrow"].match(device_name, start=before.found)
     assert match.status == REACHED and len(match.found) == len(before.found)
@@ -255,7 +255,7 @@ def test_a_search_that_starts_at_its_end_stays_there(match_of, device_name):
 
 @pytest.mark.long
 def test_a_long_scene_is_searched_span_by_span(match_of):
-    """Its windows are cut at keyframes; a span's forces act in it, those of another begin where it ends."""
+    """Windows end at keyframes; the forces of a span act within it, those of the next start at its end."""
     match = match_of("a long scene")
     windows = sorted({(force.envelope.start, force.envelope.end) for force in match.found})
     edges = sorted({edge for window in windows for edge in window})
@@ -266,8 +266,8 @@ def test_a_long_scene_is_searched_span_by_span(match_of):
     assert len(begun) == 3
 
 
-def test_a_search_tells_what_it_does(match_of):
-    """Iterations and evaluations are counted through all stages, which follow one another."""
+def test_a_search_reports_its_progress(match_of):
+    """Iterations and evaluations are counted over all stages, in order."""
     match = match_of("a smile")
     order = ["march", "coarse", "fine"]
     assert [one.iteration for one in match.history] == list(range(1, match.iterations + 1))
@@ -284,8 +284,8 @@ def test_a_search_tells_what_it_does(match_of):
 
 
 @pytest.mark.parametrize("after", [1, 12, 17])
-def test_a_search_that_is_told_to_stop_keeps_its_best(device_name, after):
-    """It ends at that iteration; what it returns is what its forces do when they are run again."""
+def test_a_stopped_search_keeps_its_best_forces(device_name, after):
+    """The search ends at that iteration; its result is that of another run with its forces."""
     told = []
 
     def heed(progress):
@@ -344,7 +344,7 @@ HOPELESS = {
 
 @pytest.fixture
 def briefly(monkeypatch):
-    """Let a search without hope end soon: with the first weight, with wide forces, after few evaluations."""
+    """Shorten searches that cannot succeed: one weight, one factor on radii, few evaluations."""
     monkeypatch.setattr(wfluid.keyframes.search, "LEAST_WEIGHT", wfluid.keyframes.search.WEIGHT)
     monkeypatch.setattr(
         wfluid.keyframes.search, "EVALUATIONS", dict.fromkeys(wfluid.keyframes.search.EVALUATIONS, 8)
@@ -354,8 +354,8 @@ def briefly(monkeypatch):
 
 @pytest.mark.usefixtures("briefly")
 @pytest.mark.parametrize("name", HOPELESS)
-def test_what_cannot_be_reached_ends_with_the_reason_and_the_distances(device_name, name):
-    """Nothing is raised: the best is returned, with how far off it is, and nothing that is not finite."""
+def test_unreachable_keyframes_are_reported_with_reason_and_residual(device_name, name):
+    """No error is raised: the best result is returned, with finite residuals."""
     case, reason = HOPELESS[name]
     match = case.match(device_name)
     assert match.status == UNREACHABLE
@@ -365,8 +365,8 @@ def test_what_cannot_be_reached_ends_with_the_reason_and_the_distances(device_na
 
 
 @pytest.mark.usefixtures("briefly")
-def test_what_can_be_reached_comes_near_beside_what_cannot(device_name):
-    """The hopeless one has its reason, the other one none, and all but arrives."""
+def test_reachable_keyframes_come_near_beside_unreachable_ones(device_name):
+    """The unreachable keyframe has a reason; the other one has none and is almost reached."""
     case = Case(arrows=[((0.5, 0.0), (0.5, 0.1)), ((0.4, 0.6), (0.48, 0.56))], cells=48, duration=0.5)
     wall, free = case.match(device_name).arrivals
     assert wall.reason and SIDE * wall.residual > 20

@@ -1,4 +1,4 @@
-"""The figure of a match: every mark where it belongs, in the picture's pixels, and a whole file."""
+"""The figure of a match: marks at their places in the picture's pixels, and complete files."""
 
 import subprocess
 import sys
@@ -49,7 +49,7 @@ def figure(match):
 
 
 def named(figure, name):
-    """The artists of a name, or whose name begins with it where that ends in a dash."""
+    """The artists with a name, or with a prefix if the name ends in a dash."""
 
     def is_it(artist):
         own = artist.get_gid() or ""
@@ -81,11 +81,11 @@ def test_marks_are_at_their_places_in_pixels(figure, match):
     np.testing.assert_allclose(points_of(figure, "reached"), [*NOSE_WAY, EAR_AIM], atol=0.5)
 
 
-def test_a_point_that_goes_on_after_its_keyframe_has_a_mark_at_the_end(figure, match):
+def test_a_point_that_moves_after_its_keyframe_has_a_mark_at_the_end(figure, match):
     np.testing.assert_allclose(points_of(figure, "at the end"), [match.tracks[-1, 1] * WIDTH], atol=1e-9)
 
 
-def test_trajectories_begin_at_the_points_and_pass_where_they_came(figure, match):
+def test_trajectories_begin_at_the_points_and_pass_their_positions(figure, match):
     lines = [line.get_xydata() for line in named(figure, "trajectory-")]
     np.testing.assert_allclose([line[0] for line in lines], [NOSE, EAR, PIN], atol=1e-4)
     np.testing.assert_allclose([line[-1] for line in lines], match.tracks[-1] * WIDTH, atol=1e-9)
@@ -101,7 +101,7 @@ def test_times_are_named_where_there_are_several(figure, match):
     assert not [text for text in figure_of(single).axes[0].texts if text.get_text().endswith(" s")]
 
 
-def test_the_legend_names_what_is_there(figure, match):
+def test_the_legend_names_the_marks_drawn(figure, match):
     names = ["source", "arrow", "keyframe", "reached", "at the end", "pin", "trajectory"]
     assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == names
     unpinned = replace(match, arrivals=tuple(one for one in match.arrivals if not one.pinned))
@@ -121,8 +121,8 @@ def test_pictures_are_shown_upright_in_their_pixels(figure, match):
         assert order > 0.95, f"the shown picture is another: correlation {order:.3f}"
 
 
-def test_lines_of_the_grid_are_where_the_map_says(figure, match):
-    """Along a line, the place that the colour comes from has one coordinate, a multiple of the spacing."""
+def test_grid_lines_follow_the_map(figure, match):
+    """Along a grid line one coordinate of the source is constant, a multiple of the spacing."""
     *_, last = match.animation.frames()
     side = max(WIDTH, HEIGHT)
     for n, (name, size) in enumerate((("x", WIDTH), ("y", HEIGHT))):
@@ -136,7 +136,7 @@ def test_lines_of_the_grid_are_where_the_map_says(figure, match):
         assert bent > 1, f"no line is bent by more than {bent:.2g} px"
 
 
-def test_the_search_is_drawn_as_it_went(figure, match):
+def test_the_curves_are_the_history_of_the_search(figure, match):
     history = match.history
     misfits = [one.worst * WIDTH if one.worst > 0 else np.nan for one in history]
     at = [one.iteration for one in history]
@@ -147,7 +147,7 @@ def test_the_search_is_drawn_as_it_went(figure, match):
     np.testing.assert_allclose(points_of(figure, "tolerance")[:, 1], 0.5)
 
 
-def test_stages_are_tinted_where_they_are_and_kept_in_sight(match):
+def test_stages_are_tinted_over_their_iterations(match):
     pytest.importorskip("matplotlib")
     stages = [MARCH, MARCH, COARSE, FINE, FINE, FINE, COARSE]
     history = tuple(Progress(stage, n + 1, n + 1, 1e-3, 20.0 + n) for n, stage in enumerate(stages))
@@ -171,7 +171,7 @@ def test_stages_are_tinted_where_they_are_and_kept_in_sight(match):
     assert texts == [MARCH, COARSE, FINE, "allowed"]
 
 
-def test_a_search_that_had_nothing_to_do_is_drawn(match, tmp_path):
+def test_a_search_without_iterations_is_drawn(match, tmp_path):
     pytest.importorskip("matplotlib")
     plot_match(replace(match, history=()), tmp_path / "nothing.png")
     assert "nothing was left to find" in [
@@ -182,7 +182,7 @@ def test_a_search_that_had_nothing_to_do_is_drawn(match, tmp_path):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("width", "height", "channels"), [(12, 96, 1), (96, 12, 4), (2500, 40, 2)])
 def test_panels_fit_any_picture(match, width, height, channels):
-    """Nothing overlaps or leaves the figure; large pictures are not carried along whole."""
+    """Artists neither overlap nor leave the figure; large pictures are reduced."""
     pytest.importorskip("matplotlib")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -211,7 +211,7 @@ def test_panels_fit_any_picture(match, width, height, channels):
     ("name", "begin"),
     [("a.png", b"\x89PNG"), ("b.PDF", b"%PDF"), ("c.svg", b"<?xml version"), ("d.PNG", b"\x89PNG")],
 )
-def test_a_figure_is_written_as_its_ending_says_and_the_same_each_time(match, tmp_path, name, begin):
+def test_a_figure_has_the_format_of_its_ending_and_equal_bytes_each_time(match, tmp_path, name, begin):
     pytest.importorskip("matplotlib")
     path = tmp_path / name
     plot_match(match, str(path))
@@ -222,7 +222,7 @@ def test_a_figure_is_written_as_its_ending_says_and_the_same_each_time(match, tm
     assert [one.name for one in tmp_path.iterdir()] == [name]
 
 
-def test_settings_of_the_user_change_nothing_and_are_kept(match, tmp_path):
+def test_the_users_settings_of_matplotlib_are_ignored_and_kept(match, tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
     plot_match(match, tmp_path / "a.png")
     with matplotlib.rc_context({"font.size": 20.0, "savefig.bbox": "tight"}):
@@ -248,7 +248,7 @@ def test_a_figure_that_fails_leaves_the_old_one(match, tmp_path, monkeypatch):
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
 
 
-def test_what_cannot_be_written_is_refused_before_anything_is_drawn(tmp_path):
+def test_an_invalid_path_is_refused_before_drawing(tmp_path):
     with pytest.raises(FileError, match=r"a\.gif: plots are written as \.png, \.pdf, \.svg$"):
         plot_match(None, tmp_path / "a.gif")
     with pytest.raises(FileError, match=r"none: no such folder; make it first$"):

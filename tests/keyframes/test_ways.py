@@ -1,4 +1,4 @@
-"""The first guess: ways hit their keyframes and keep apart, forces stand on them, windows share the time."""
+"""The start of a search: ways pass their keyframes and keep apart; forces lie on them, in windows."""
 
 import math
 from itertools import combinations, pairwise
@@ -27,7 +27,7 @@ TIMELINE = Timeline(1.0, fps=24, substeps=2)
 
 
 def particles(*paths, pins=()):
-    """Of points with their destinations by time."""
+    """Targets of points with destinations by time."""
     keyframes = [ParticleKeyframe(point, to, t) for point, stops in paths for t, to in stops.items()]
     return targets_of(keyframes, pins, EXTENT, TIMELINE.end)
 
@@ -40,8 +40,8 @@ MEETINGS = {"swap": SWAP, "crossing": CROSSING, "head-on": HEAD_ON}
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.25, -0.7])
-def test_a_way_hits_its_keyframes_whatever_its_bend(bend):
-    """x(0) = p, x(t_k) = K_k; it rests afterwards, and jumps nowhere."""
+def test_a_way_passes_its_keyframes_with_any_bend(bend):
+    """x(0) = p and x(t_k) = K_k; the way is continuous, and constant after the last keyframe."""
     (own,) = particles(PATH)
     way = Way(own, bend)
     at = way.at(np.array([0.0, 0.25, 0.5, 1.0, 1.5]))
@@ -52,7 +52,7 @@ def test_a_way_hits_its_keyframes_whatever_its_bend(bend):
 
 
 def test_a_way_begins_at_rest_and_runs_evenly_from_keyframe_to_keyframe():
-    """First p^2 (2 - p) of the distance in the part p of the time, then p of it."""
+    """After a fraction p of a leg's time p^2 (2 - p) of the first distance is covered, then p of each."""
     (own,) = particles(PATH)
     way, (a, b, c) = Way(own, 0.0), np.array([(0.3, 0.4), (0.5, 0.3), (0.6, 0.5)])
     for part in (0.01, 0.3, 0.8):
@@ -72,8 +72,8 @@ def test_a_bend_lies_to_the_left_of_the_way():
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
 @pytest.mark.parametrize("name", MEETINGS)
-def test_ways_keep_apart_that_would_meet_on_straight_lines(name, seed):
-    """At all times by half of the least distance at their ends; straight lines come near one another."""
+def test_ways_bend_where_straight_lines_would_meet(name, seed):
+    """Their distance is always at least half the least one at their ends; that of straight lines is not."""
     own = particles(*MEETINGS[name])
     ends = min(
         min(math.dist(a.point, b.point), math.dist(a.destinations[-1], b.destinations[-1]))
@@ -84,7 +84,7 @@ def test_ways_keep_apart_that_would_meet_on_straight_lines(name, seed):
 
 
 def nearest(ways):
-    """The least distance of two ways at one time, at moments of our own."""
+    """The least distance of two ways at one time, over independent samples of time."""
     times = np.linspace(0, 1, 501)
     places = [way.at(times) for way in ways]
     return min(np.linalg.norm(a - b, axis=1).min() for a, b in combinations(places, 2))
@@ -100,8 +100,8 @@ def test_a_way_goes_round_a_pin():
 
 @pytest.mark.parametrize("y", [0.03, 0.77])
 @pytest.mark.parametrize("seed", [0, 1, 2, 3])
-def test_ways_bend_away_from_walls_whatever_the_seed(y, seed):
-    """One arrow comes no nearer to the wall than it began; of a swap both stay in the picture."""
+def test_ways_bend_away_from_walls_for_any_seed(y, seed):
+    """A single way comes no nearer to the wall than its start; ways that swap stay in the picture."""
     arrow, swap = ((0.3, y), {1.0: (0.7, y)}), [((0.3, y), {1.0: (0.6, y)}), ((0.6, y), {1.0: (0.3, y)})]
     for paths in ([arrow], swap):
         for way in plan_ways(particles(*paths), EXTENT, seed):
@@ -111,7 +111,7 @@ def test_ways_bend_away_from_walls_whatever_the_seed(y, seed):
 
 
 def test_the_seed_chooses_the_side():
-    """The same seed the same ways; over some seeds both sides, as mirror images."""
+    """The same seed gives the same ways; different seeds give both sides, as mirror images."""
     own = particles(*SWAP)
     found = {tuple(way.bend for way in plan_ways(own, EXTENT, seed)) for seed in range(8)}
     assert len(found) == 2
@@ -135,8 +135,8 @@ def test_radii_are_half_the_distance_of_ways_within_their_limits():
     assert radii[0] == radii[2] == NARROWEST and radii[1] == WIDEST  # the first runs over the pin
 
 
-def test_windows_begin_at_nought_and_end_at_keyframes():
-    """Steps that increase; every keyframe is an edge, the last one the end; none is shorter than allowed."""
+def test_windows_begin_at_0_and_end_at_keyframes():
+    """Edges increase and include every keyframe, the last one as the end; no window is too short."""
     own = particles(PATH, ((0.7, 0.6), {0.75: (0.8, 0.7)}))
     for radius in (0.01, 0.05, 0.12):
         ways = [Way(one, 0.1) for one in own]
@@ -159,8 +159,8 @@ def test_windows_end_with_the_last_keyframe():
     assert window_edges([Way(one_step[0], 0.1)], [0.006], TIMELINE) == [0, 1]
 
 
-def test_forces_stand_on_the_way_in_windows_that_share_its_time():
-    """Each where the point is expected in the middle of its window, which ends where the next begins."""
+def test_forces_lie_on_the_way_in_windows_that_cover_its_time():
+    """Each lies at the expected position of its point in the middle of its window; windows are contiguous."""
     path, short = particles(PATH, ((0.7, 0.6), {0.5: (0.8, 0.7)}))
     edges = window_edges([Way(path, 0.2), Way(short, 0.2)], [0.05, 0.05], TIMELINE)
     for one, end in ((path, 1.0), (short, 0.5)):
@@ -177,7 +177,7 @@ def test_forces_stand_on_the_way_in_windows_that_share_its_time():
 
 
 def journey_of(paths, moments, pins=(), **more):
-    """Of ways without a bend."""
+    """The misfit of ways without a bend."""
     own = particles(*paths, pins=pins)
     return WayMisfit(
         [Way(one, 0.0) for one in own], np.array([one.point for one in own]), moments, 0.1, **more
@@ -185,8 +185,8 @@ def journey_of(paths, moments, pins=(), **more):
 
 
 @pytest.mark.parametrize("led", [1.0, 0.0])
-def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius(led):
-    """At keyframes by their weights; between them by 1 where led, by `HOLD` where pinned."""
+def test_the_misfit_is_half_the_sum_of_squares_in_units_of_a_radius(led):
+    """Weights are those of keyframes; between them 1 for guided points and `HOLD` for pins."""
     paths, pin = [((0.3, 0.4), {0.5: (0.5, 0.3)}), ((0.3, 0.6), {1.0: (0.5, 0.6)})], (0.7, 0.7)
     off = np.array([(0.03, 0.04), (0.0, -0.02), (0.06, 0.08)])
     squares = np.sum((off / 0.1) ** 2, axis=1)
@@ -205,7 +205,7 @@ def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius(led):
     assert longest(journey.misfits(places)) == pytest.approx(0.1)  # of the pin, at its keyframes
 
 
-def test_a_journey_leads_only_the_points_it_is_told_to():
+def test_the_misfit_guides_only_the_selected_points():
     paths = [((0.3, 0.4), {1.0: (0.5, 0.3)}), ((0.3, 0.6), {1.0: (0.5, 0.6)})]
     journey = journey_of(paths, (0.5, 1.0), guided=[False, True])
     slope = journey.at(0.5, np.zeros((2, 2)))[1]
@@ -213,8 +213,8 @@ def test_a_journey_leads_only_the_points_it_is_told_to():
     assert journey.at(1.0, np.zeros((2, 2)))[1].all()
 
 
-def test_the_misfit_aims_beside_places_by_corrections_and_multipliers():
-    """A correction moves the place itself; a multiplier only the aim, so that the misfit stays."""
+def test_corrections_and_multipliers_shift_the_aims_of_the_misfit():
+    """A correction moves the target; a multiplier moves only the aim and keeps the misfit."""
     by = {1.0: np.array([[0.02, -0.02]])}
     for kind, left in (("corrections", 0.0), ("multipliers", np.hypot(0.02, 0.02))):
         journey = journey_of([((0.3, 0.4), {1.0: (0.5, 0.3)})], (0.5, 1.0), **{kind: by})
@@ -225,7 +225,7 @@ def test_the_misfit_aims_beside_places_by_corrections_and_multipliers():
         assert journey.at(1.0, np.array([[0.5, 0.3]]))[0] == pytest.approx(0.5 * 0.08)
 
 
-def test_smoothness_is_half_the_squares_of_changes_beside_what_is_expected():
+def test_smoothness_is_half_the_sum_of_squared_deviations_from_expected_changes():
     """1/2 w sum |(m_k+1 - e_k+1) - (m_k - e_k)|^2, chain by chain; its gradient by differences."""
     rng = np.random.default_rng(0)
     entries = [np.array([[0, 1], [4, 5], [2, 3]]), np.array([[6, 8], [9, 7]])]

@@ -1,4 +1,4 @@
-"""Forces have their shape and impulse, moving ones follow, pushes carry as far as their arrow."""
+"""Forces have their shape and impulse, follow their paths, and move the picture by their arrows."""
 
 import math
 
@@ -42,14 +42,14 @@ def nearest(grid, periodic, x, y, center):
 
 
 def pushed(make_solver, forces, t=0.0, dt=0.01, grid=STRETCHED, **fluid):
-    """What forces add to u and v on the first faces, in a step from rest, before all else."""
+    """The velocity that forces add to u and v on the first faces, in a step from rest."""
     solver = make_solver(grid.nx, grid.ny, grid=grid, **fluid)
     solver.step(solver.rest(), solver.rest(), forces, t, dt)
     return [to_numpy(f, solver.layout) for f in solver._step.pushed]
 
 
 def assert_on_faces(got, expected, periodic, atol=2e-7):
-    """Equal on all faces that are not on a closed wall, where nothing passes."""
+    """Equal on all faces except those on closed walls, where the force is 0."""
     for n, (f, e) in enumerate(zip(got, expected, strict=True)):
         e = np.broadcast_to(e, f.shape).copy()
         if not periodic:
@@ -111,8 +111,8 @@ def test_a_winds_fields_do_not_depend_on_its_vector():
 
 
 @pytest.mark.parametrize("blow", [9.99, -9.99, 10.01])
-def test_a_wind_beyond_the_limit_is_refused_with_the_velocity_it_would_give(device, blow):
-    """The limit holds for the whole vector, (6e3, 8e3) times the blow: 1e5 longer sides/s."""
+def test_a_wind_beyond_the_limit_is_refused_with_its_velocity(device, blow):
+    """The limit applies to the length of the vector, (6e3, 8e3) times the impulse: 1e5 longer sides/s."""
     wind = Wind((6e3, 8e3), blow * Instantaneous())
     fluid = Fluid(walls="periodic")
     impulses = Forcing([wind], fluid, Grid(5, 4), device)
@@ -125,17 +125,17 @@ def test_a_wind_beyond_the_limit_is_refused_with_the_velocity_it_would_give(devi
 
 @pytest.mark.parametrize("cut", [1, 4, 7])
 def test_an_impulse_over_a_window_does_not_depend_on_the_steps(make_solver, cut):
-    """Summed over its window a force has given vector times the integral of its envelope."""
+    """Summed over its window, a force adds its vector times the integral of its envelope."""
     envelope = Oscillator(period=0.31, phase=0.1, centred=False, end=0.4)
     forces = [
         GaussianForce((0.5, 0.35), (0.8, -0.4), 0.05, envelope),
         VortexForce((0.2, 0.3), 3.0, 0.04, envelope),
     ]
-    whole = pushed(make_solver, forces, 0.0, 0.5)
+    total = pushed(make_solver, forces, 0.0, 0.5)
     steps = [pushed(make_solver, forces, n * 0.5 / cut, 0.5 / cut) for n in range(cut)]
     for n in (0, 1):
-        np.testing.assert_allclose(sum(step[n] for step in steps), whole[n], atol=1e-6)
-    assert np.abs(whole[0]).max() == pytest.approx(0.8 * abs(envelope.integral(0, 0.5)), rel=0.05)
+        np.testing.assert_allclose(sum(step[n] for step in steps), total[n], atol=1e-6)
+    assert np.abs(total[0]).max() == pytest.approx(0.8 * abs(envelope.integral(0, 0.5)), rel=0.05)
 
 
 def test_a_moving_force_follows_its_path(make_solver):
@@ -167,7 +167,7 @@ def test_a_stroke_gives_its_strength_times_its_velocity():
 
 
 def test_groups_equal_the_sum_of_their_members(make_solver):
-    """Members under the common envelope and strength, groups in groups too."""
+    """Members with the common envelope and strength, in nested groups too."""
     swing = Oscillator(period=0.7, centred=False)
     one = GaussianForce((0.3, 0.3), (1.0, 0.4), 0.05)
     two = VortexForce((0.6, 0.4), 3.0, 0.08, Constant(0.0, 0.3))
@@ -199,7 +199,7 @@ def test_curl_noise_is_free_of_divergence(walls, period):
         assert np.sqrt((fx**2 + fy**2).mean()) > 1.0
 
 
-def test_curl_noise_is_the_same_on_any_grid_and_as_strong_as_said():
+def test_curl_noise_does_not_depend_on_the_grid_and_has_the_given_strength():
     """Halving the cells: the faces in common differ by O(h^2); far from walls the rms is the strength."""
     walls, noise = Walls.parse("periodic"), NoiseForce(strength=2.0, scale=0.25, seed=1)
     coarse, fine = (noise.fields(Grid(n, n), walls)[0][0] for n in (64, 192))
@@ -211,10 +211,10 @@ def test_curl_noise_is_the_same_on_any_grid_and_as_strong_as_said():
     assert abs(np.corrcoef(coarse.ravel(), other.ravel())[0, 1]) < 0.3
 
 
-def test_changing_noise_comes_back_after_its_period(make_solver):
+def test_changing_noise_repeats_after_its_period(make_solver):
     noise = NoiseForce(strength=1.0, scale=0.3, period=0.4)
-    first, half, whole = (pushed(make_solver, [noise], t, 0.01)[0] for t in (0.0, 0.2, 0.4))
-    np.testing.assert_allclose(whole, first, atol=1e-6)
+    first, half, total = (pushed(make_solver, [noise], t, 0.01)[0] for t in (0.0, 0.2, 0.4))
+    np.testing.assert_allclose(total, first, atol=1e-6)
     np.testing.assert_allclose(half, -first, atol=1e-6)
 
 
@@ -228,7 +228,7 @@ def run(solver, forces, steps, dt, points=()):
 
 @pytest.mark.parametrize("walls", ["free-slip", "no-slip", "periodic"])
 def test_a_growth_prescribes_its_divergence(make_solver, walls):
-    """After a step div v is rate (1 - r^2 / 2) exp(-r^2 / 2) less its mean, as exactly as the projection."""
+    """After a step div v is rate (1 - r^2 / 2) exp(-r^2 / 2) minus its mean, as exactly as the projection."""
     grid = Grid(48, 40, 1.0, 0.79)
     solver = make_solver(48, 40, grid=grid, walls=walls, pressure_cycles=8)
     state = run(solver, [Growth((0.8, 0.3), 3.0, 0.11, Constant(0.0, 0.05))], 1, 0.1)
@@ -259,8 +259,8 @@ def test_areas_grow_by_the_integral_of_the_rate(make_solver, rate):
     assert math.log(area) == pytest.approx(rate * 0.5 / math.pi, rel=0.02)
 
 
-def test_growth_keeps_the_area_of_the_whole(make_solver):
-    """What is beyond the ring stays where it is: no displacement ten radii away, none in free space."""
+def test_growth_keeps_the_total_area(make_solver):
+    """Places beyond the ring stay in place: no displacement ten radii away."""
     solver = make_solver(96, 96, stretch=1, viscosity=0.0)
     state = run(solver, [Growth((0.5, 0.5), 2.0, 0.05)], 10, 0.02)
     d_x, _ = state.displacement
@@ -268,8 +268,8 @@ def test_growth_keeps_the_area_of_the_whole(make_solver):
     assert np.abs(d_x[:, [0, 1, -2, -1]]).max() < 1e-5
 
 
-def test_a_weighted_growth_spares_what_the_weight_spares(make_solver):
-    """The prescribed divergence is the weighted one less its mean over the whole."""
+def test_a_weight_excludes_places_from_a_growth(make_solver):
+    """The prescribed divergence is the weighted one minus its mean over the picture."""
     grid = Grid(40, 40, 1.0, 1.0)
     half = Painted(np.broadcast_to(np.arange(40) < 20, (40, 40)).astype(float))
     solver = make_solver(40, 40, grid=grid, pressure_cycles=8)
@@ -281,8 +281,8 @@ def test_a_weighted_growth_spares_what_the_weight_spares(make_solver):
     np.testing.assert_allclose(got, expected - expected.mean(), atol=6e-5 * 2)
 
 
-def test_a_step_of_no_length_leaves_a_growth_going(make_solver):
-    """Between two steps one of dt = 0 changes nothing: the divergence stays prescribed."""
+def test_a_step_of_length_0_keeps_the_divergence_of_a_growth(make_solver):
+    """A step of dt = 0 between two steps changes nothing: the divergence stays prescribed."""
     growth = Growth((0.5, 0.5), 2.0, 0.1)
     solver = make_solver(32, 32, stretch=1)
     now, after = solver.rest(), solver.rest()
@@ -292,8 +292,8 @@ def test_a_step_of_no_length_leaves_a_growth_going(make_solver):
     np.testing.assert_allclose(now.velocity[0], before, atol=1e-3 * np.abs(before).max())
 
 
-def test_a_growth_at_rest_changes_nothing(make_solver):
-    """One of rate 0 beside a push in a variable viscosity: the same flow to the bit."""
+def test_a_growth_of_rate_0_changes_nothing(make_solver):
+    """A growth of rate 0 beside a push in a variable viscosity gives the same flow bit for bit."""
     x = (np.arange(32) + 0.5) / 32
     stiff = 0.001 + (x > 0.6) * np.ones((32, 1))
     push, ends = GaussianForce((0.5, 0.5), (2.0, 0.0), 0.1), []
@@ -309,8 +309,8 @@ def test_too_much_growth_in_a_step_is_refused_with_the_remedy(make_solver):
 
 @pytest.mark.parametrize("walls", ["free-slip", "periodic", "periodic,free-slip", "free-slip,periodic"])
 @pytest.mark.parametrize("scale", [0.3, 1.0, 2.0])
-def test_noise_is_never_far_stronger_than_said_nor_nothing(walls, scale):
-    """Whole waves on axes that wrap and ramps at walls: the rms of 20 seeds stays about the strength."""
+def test_the_strength_of_noise_stays_near_the_given_one_for_any_seed(walls, scale):
+    """On periodic axes and between walls, the root mean square for 20 seeds stays near the strength."""
     grid = Grid(48, 36, 1.0, 0.75)
     for seed in range(20):
         force = NoiseForce(strength=1.0, scale=scale, seed=seed)
@@ -320,7 +320,7 @@ def test_noise_is_never_far_stronger_than_said_nor_nothing(walls, scale):
         assert most < force.reach, (seed, most)
 
 
-def test_growth_beside_something_stiff_converges_with_the_step(make_solver):
+def test_growth_beside_a_stiff_disc_converges_with_the_step(make_solver):
     """First order in dt: a quarter of the step leaves at most 0.4 of the error.
 
     The pressure of a growth is of its step alone; kept for the next it would push on.
@@ -370,7 +370,7 @@ def carried(make_solver, force, duration, steps, n=128):
 
 
 @pytest.mark.parametrize(
-    ("text", "course"),
+    ("text", "motion"),
     [
         ("256,256:6,3:radius=40", "end"),
         ("256,256:6,3:radius=40,at=0", "end"),
@@ -378,11 +378,11 @@ def carried(make_solver, force, duration, steps, n=128):
         ("256,256:-6,-3:radius=40,period=0.5,phase=0.75", "swing"),
     ],
 )
-def test_a_push_carries_its_centre_by_its_arrow(make_solver, text, course):
+def test_a_push_moves_its_center_by_its_arrow(make_solver, text, motion):
     """Inviscid, arrow short beside the radius: within 10 % (walls, and the blob moves off its force)."""
     force = Drawing(512, 512, 1.0).force(parse_force("push", text))
     way = (carried(make_solver, force, 1.0, 96) - force.center) * 512
-    reached = way[-1] if course == "end" else (way[48:].max(axis=0) - way[48:].min(axis=0)) / 2
+    reached = way[-1] if motion == "end" else (way[48:].max(axis=0) - way[48:].min(axis=0)) / 2
     np.testing.assert_allclose(reached, (6, 3), rtol=0.1)
 
 
@@ -407,8 +407,8 @@ def test_an_oscillators_drift_per_period_is_bounded(make_solver):
     ("text", "says"),
     [
         ("3,4", "expected X,Y:DX,DY"),
-        ("3:4,5", "the point X,Y needs two numbers"),
-        ("3,4:5", "the arrow DX,DY needs two numbers"),
+        ("3:4,5", "the point X,Y is '3': expected two numbers"),
+        ("3,4:5", "the arrow DX,DY is '5': expected two numbers"),
         ("3,x:1,1", "'x' is not a number"),
         ("3,4:1,nan", "not finite"),
         ("3,4:1,1:mass=3", "'mass=3' is not key=value"),
@@ -416,12 +416,12 @@ def test_an_oscillators_drift_per_period_is_bounded(make_solver):
         ("3,4:1,1:radius=0", "radius: 0.0: expected a number above 0"),
         ("3,4:1,1:radius=1,radius=2", "given twice"),
         ("3,4:1,1:phase=0.2", "phase= needs period="),
-        ("3,4:1,1:at=0,period=1", "at= is one blow"),
+        ("3,4:1,1:at=0,period=1", "at= is an impulse"),
         ("3,4:1,1:start=2,end=1", "end 1 is not after start 2"),
         ("3,4:1,1:at=-1", "at: -1.0: expected a number from 0"),
     ],
 )
-def test_a_malformed_push_is_refused_by_its_part(text, says):
+def test_a_malformed_push_is_refused_with_the_invalid_part(text, says):
     with pytest.raises(ValueError, match=says):
         Drawing(100, 100, 3.0).force(parse_force("push", text))
 

@@ -1,4 +1,4 @@
-"""Forces from pictures: their fields, what pressure leaves of them, weights on other forces."""
+"""Forces from pictures: fields, the effect of pressure on them, and weights on other forces."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ OPEN, WRAPPED = Walls(), Walls.parse("periodic")
 
 
 def bumps(grid, seed=0):
-    """Smooth random intensities 0 … 1 of the grid's size."""
+    """Smooth random intensities 0 … 1, (ny, nx)."""
     rng = np.random.default_rng(seed)
     x, y = (np.arange(grid.nx) + 0.5) / grid.nx, ((np.arange(grid.ny) + 0.5) / grid.ny)[:, None]
     values = sum(
@@ -24,8 +24,8 @@ def bumps(grid, seed=0):
     return (values - values.min()) / np.ptp(values)
 
 
-def test_a_gradient_points_to_the_brighter_side_with_the_strength_said():
-    """A ramp along x: the same force everywhere between the walls, none through them."""
+def test_a_gradient_points_to_the_brighter_side_with_the_given_strength():
+    """A ramp along x gives a constant force between the walls and none on them."""
     ramp = np.broadcast_to((np.arange(24) + 0.5) / 24, (18, 24))
     along, across = ImageForce(ramp, strength=3.0, radius=0).fields(GRID, OPEN)[0]
     np.testing.assert_allclose(along[:, 1:], 3.0, rtol=1e-5)
@@ -44,7 +44,7 @@ def test_a_contour_has_the_brighter_side_on_its_right_and_no_divergence():
     assert np.abs(u).max() > 0.3
 
 
-def test_the_blur_takes_fine_grain_and_keeps_what_is_wide():
+def test_the_blur_removes_short_waves_and_keeps_long_ones():
     """A cosine of wavelength L loses exp(-(2 pi radius / L)^2 / 2) of itself: Gaussian blur's transform."""
     grid, radius = Grid(128, 4, 1.0, 4 / 128), 0.03
     x = (np.arange(128) + 0.5) / 128
@@ -73,16 +73,16 @@ def test_vectors_are_read_with_zero_at_half_range():
     assert force.reach == pytest.approx(4 * np.hypot(0.5, 0.25))
 
 
-def test_transparent_vectors_are_none_and_alpha_is_no_channel():
-    """A hole in a picture of vectors pushes nothing; grey with alpha has one channel only."""
+def test_transparent_vectors_are_0_and_alpha_is_no_component():
+    """A transparent place of a picture of vectors has no force; grey with alpha has one channel only."""
     clear = Picture(np.zeros((4, 4, 4), np.float32), 3, "uint8", srgb=False)
     assert np.abs(vectors_of(clear)).max() == 0
     with pytest.raises(ValueError, match="needs two channels"):
         vectors_of(Picture(np.ones((4, 4, 2), np.float32), 1, "uint8", srgb=False))
 
 
-def test_the_strength_is_the_length_where_it_is_steepest():
-    """Along a diagonal too; and what is flat but for rounding is refused."""
+def test_the_strength_is_the_force_at_the_steepest_place():
+    """Along a diagonal too; a picture that is constant up to rounding is refused."""
     x, y = (np.arange(24) + 0.5) / 24, ((np.arange(18) + 0.5) / 24)[:, None]
     force = ImageForce((x + y) / 2, strength=3.0, radius=0).fields(GRID, OPEN)[0]
     np.testing.assert_allclose(np.hypot(*force)[1:, 1:], 3.0, rtol=1e-4)
@@ -118,7 +118,7 @@ def test_impulses_are_those_of_the_envelope(make_solver):
 
 
 def test_a_weight_scales_a_force_where_it_is_painted(make_solver):
-    """One is no weight, a half is half the force, and forces with and without add up, in any order."""
+    """Weight 1 equals no weight, 1/2 halves the force, and forces with and without weights add up."""
     full = GaussianForce((0.3, 0.4), (0.2, 0.1), 0.1)
     other = GaussianForce((0.7, 0.4), (-0.1, 0.2), 0.05)
     drawn = ImageForce(bumps(GRID), "contour", 0.1)
@@ -157,7 +157,7 @@ def test_a_weight_scales_a_force_where_it_is_painted(make_solver):
         (lambda: ImageForce(np.array([[0.0, np.nan]])), "nan"),
     ],
 )
-def test_what_is_no_force_is_refused(make, message):
+def test_invalid_forces_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 

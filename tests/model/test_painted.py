@@ -1,4 +1,4 @@
-"""Paintings: intensity by the type's range, stretched and averaged; freezing by degrees; time."""
+"""Painted quantities: intensity, resampling, freeze masks, values over time."""
 
 import numpy as np
 import pytest
@@ -15,13 +15,13 @@ GRID = Grid(8, 6, 1.0, 0.75)
 
 
 def shown(values, dtype="uint8", alpha=None):
-    """A picture whose file has these numbers, 0 … 1."""
+    """A picture whose file has the given numbers, 0 … 1."""
     values = np.asarray(values, dtype=np.float32)
     return Picture(to_linear(values) if dtype in ("uint8", "uint16") else values, alpha, dtype)
 
 
-def test_intensity_is_the_files_luminance_by_the_types_range(tmp_path):
-    """Rec. 709 weights on display values; half of the range is a half, whatever else is in the picture."""
+def test_intensity_is_the_luminance_relative_to_the_range_of_the_type(tmp_path):
+    """Rec. 709 weights on display values; half of the range is 1/2, independent of the other pixels."""
     colours = np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0.5, 0.5, 0.5]]], dtype=np.float32)
     np.testing.assert_allclose(intensity(shown(colours)), [[0.2126, 0.7152], [0.0722, 0.5]], atol=1e-6)
     flat = np.full((2, 2, 1), 128 / 255)
@@ -32,20 +32,20 @@ def test_intensity_is_the_files_luminance_by_the_types_range(tmp_path):
     np.testing.assert_allclose(intensity(linear), 128 / 255, atol=1e-6)
 
 
-def test_transparent_is_unpainted():
+def test_transparent_places_have_intensity_0():
     straight = np.array([[[1.0, 1.0], [1.0, 0.25], [0.5, 0.0]]])  # grey and alpha
     premultiplied = straight * np.array([[[1.0], [0.25], [0.0]]])
     picture = Picture(np.dstack([premultiplied[..., 0], straight[..., 1]]).astype(np.float32), 1, "uint8")
     np.testing.assert_allclose(intensity(picture), [[1.0, 0.25, 0.0]], atol=1e-6)
 
 
-def test_values_above_the_range_are_cut_off():
+def test_values_above_the_range_are_clamped():
     np.testing.assert_allclose(intensity(shown([[[4.0], [0.5]]], "float")), [[1.0, 0.5]])
 
 
 @given(arrays(np.float64, (12, 16), elements=st.floats(0, 1)))
 def test_a_painting_keeps_its_mean_and_its_range_at_any_size(values):
-    """Averaged onto fewer cells, stretched onto more: no overshoot, the same amount of paint."""
+    """Averaged onto fewer cells or interpolated onto more, values do not overshoot and keep their mean."""
     for grid in (Grid(8, 6), Grid(16, 12), Grid(37, 23)):
         on = Painted(values).sample(grid)
         assert on.shape == (grid.ny, grid.nx)
@@ -60,8 +60,8 @@ def test_shrinking_does_not_alias():
     np.testing.assert_allclose(Painted(board).sample(GRID)[1:-1, 1:-1], 0.5, atol=0.02)
 
 
-def test_paint_lands_where_it_is_painted():
-    """A square over three by three cells: full in its middle, nothing two cells away."""
+def test_values_stay_at_their_place():
+    """A square over three by three cells has its full value in the middle and 0 two cells away."""
     values = np.zeros((60, 80))
     values[10:40, 40:70] = 1.0
     on = Painted(values, scale=3.0).sample(GRID)
@@ -77,7 +77,7 @@ def test_scale_floor_and_inversion():
 
 
 def test_freezing_is_drag_on_a_logarithmic_scale():
-    """(1 + strength)^m - 1: nothing without paint, all with full paint, equal factors for equal degrees."""
+    """Drag is (1 + strength)^m - 1: 0 for m = 0, the strength for m = 1, equal ratios for equal steps."""
     mask = np.array([[0.0, 0.25], [0.5, 1.0]])
     drag = Freeze(mask, 9999.0).sample(Grid(4, 4))[::3, ::3]
     np.testing.assert_allclose(drag[0, 0], 0.0, atol=1e-9)
@@ -85,14 +85,14 @@ def test_freezing_is_drag_on_a_logarithmic_scale():
     np.testing.assert_allclose((1 + drag[0, 1]) ** 2, 1 + drag[1, 0], rtol=1e-5)
 
 
-def test_keys_are_joined_by_straight_lines_and_held_outside():
+def test_keys_are_interpolated_linearly_and_constant_outside():
     low, high = np.zeros((6, 8)), np.ones((6, 8))
     keyed = Keyed({1.0: high, 0.5: low, 3.0: 0.25})
     for t, expected in ((0.0, 0.0), (0.5, 0.0), (0.625, 0.25), (1.0, 1.0), (2.0, 0.625), (9.0, 0.25)):
         np.testing.assert_allclose(sample_at(keyed, GRID, t), expected)
 
 
-def test_a_function_of_time_may_give_anything():
+def test_a_function_of_time_may_return_any_quantity():
     for given_back in (0.5, np.full((3, 3), 0.5), Painted(np.ones((2, 2)), 0.5), Keyed({0.0: 0.5})):
         np.testing.assert_allclose(sample_at(lambda t, g=given_back: g, GRID, 1.0), 0.5)
 
@@ -124,7 +124,7 @@ def test_a_function_of_time_may_give_anything():
         (lambda: sample_at(lambda t: -t, GRID, 2.0), "viscosity at 2 s -2.0"),
     ],
 )
-def test_what_is_no_viscosity_or_drag_is_refused(make, message):
+def test_invalid_viscosities_and_masks_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 
@@ -142,7 +142,7 @@ def test_other_things_are_a_type_error(make, message):
         make()
 
 
-def test_a_viscosity_that_goes_wrong_while_running_stops_with_its_time(make_solver):
+def test_a_viscosity_that_becomes_invalid_stops_the_run_with_its_time(make_solver):
     solver = make_solver(8, 6, viscosity=lambda t: 0.1 - t)
     a, b = solver.rest(), solver.rest()
     solver.step(a, b, [], 0.0, 0.05)

@@ -1,4 +1,4 @@
-"""Maps between any time of a flow and its two ends: shifts are exact, each way undoes the other."""
+"""Maps of a flow to its start and to its end: shifts are exact, and the two maps are inverse."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,17 +14,17 @@ from wfluid.morphing.flow_maps import flow_maps
 WALLS = ("free-slip", "no-slip", "periodic", "periodic,no-slip")
 
 TURN = (VortexForce((0.5, 0.4), 30.0, 0.12), GaussianForce((0.3, 0.5), (3.0, -2.0), 0.12))
-"""It turns the middle by more than half a turn, and carries a fifth of the picture far."""
+"""A vortex that turns the middle by more than half a turn and moves a fifth of the picture far."""
 
 SECONDS = 0.5
 
 FINER = ((32, 6), (64, 12), (128, 24))
-"""Cells and steps, both twice as many each time."""
+"""Numbers of cells and steps, both doubled each time."""
 
 
 @cache
 def turned(device, cells, steps, walls="free-slip"):
-    """The passage of `TURN`."""
+    """The flow maps of `TURN`."""
     fluid, grid = Fluid(viscosity=0.01, walls=walls), Grid.for_picture(4, 3, cells)
     return flow_maps(Solver(grid, fluid, open_device(device)), TURN, timeline(steps))
 
@@ -39,7 +39,7 @@ def name(request):
 
 
 def falls(errors):
-    """The orders at which errors fall."""
+    """The orders of convergence of errors."""
     return np.log2(np.divide(errors[:-1], errors[1:]))
 
 
@@ -71,8 +71,8 @@ def test_nothing_moves_without_forces(make_solver):
 
 
 @pytest.mark.parametrize("walls", WALLS)
-def test_at_the_ends_maps_are_exactly_zero(name, walls):
-    """The start is itself after nothing, the end when all is over; beyond the ends of time too."""
+def test_maps_are_exactly_zero_at_their_ends(name, walls):
+    """The map to the start is 0 at the start, the map to the end at the end, and both for times outside."""
     passage = turned(name, 32, 6, walls)
     for part in (0, 0.0, -1.0, np.zeros((24, 32))):
         assert not passage.since_start(part).displacement.any()
@@ -98,14 +98,14 @@ def test_going_to_the_end_and_back_is_the_identity_to_second_order(name):
 
 
 @pytest.mark.parametrize("walls", WALLS)
-def test_with_every_wall_each_way_undoes_the_other(name, walls):
+def test_the_two_maps_are_inverse_for_every_wall(name, walls):
     passage = turned(name, 64, 12, walls)
     longest = np.linalg.norm(passage.to_end[0], axis=2).max()
     assert longest > 0.1 and passage.inconsistency().max() < 0.01 * longest
 
 
-def test_inconsistency_tells_maps_that_belong_to_different_flows(make_solver):
-    """Shifts that are a cell apart miss by a cell, everywhere."""
+def test_inconsistency_detects_maps_of_different_flows(make_solver):
+    """The inconsistency of shifts that differ by one cell is one cell everywhere."""
     solver = make_solver(24, 17, walls="periodic", viscosity=0.02)
     passage = flow_maps(solver, [Wind((0.9, -0.5))], Timeline(0.5, 12, 2))
     off = replace(passage, to_end=passage.to_end + np.float32([1 / 24, 0]))
@@ -113,7 +113,7 @@ def test_inconsistency_tells_maps_that_belong_to_different_flows(make_solver):
 
 
 def test_particles_end_where_the_map_to_the_end_says(name):
-    """From every frame, those that the animation follows; the difference falls at second order."""
+    """From every frame, the animation's tracked points; the difference converges to second order."""
     points = np.random.default_rng(0).uniform(0.2, 0.55, (30, 2))
     to_end, to_start = [], []
     for cells, steps in FINER:
@@ -132,7 +132,7 @@ def test_particles_end_where_the_map_to_the_end_says(name):
 
 
 def test_the_map_since_the_start_is_the_animations_own(name):
-    """At every step, to the bit."""
+    """At every step, bit for bit."""
     passage, steps = turned(name, 32, 6), 6
     picture, fluid = Picture(np.zeros((3, 4, 1), np.float32)), Fluid(viscosity=0.01)
     animation = Animation(picture, fluid, TURN, timeline(steps), cells=32, device=name)
@@ -140,24 +140,24 @@ def test_the_map_since_the_start_is_the_animations_own(name):
         np.testing.assert_array_equal(passage.since_start(step / steps).displacement, frame.map.displacement)
 
 
-def test_between_two_steps_the_map_is_on_the_line_which_is_second_order(name):
+def test_linear_interpolation_between_steps_is_of_second_order(name):
     """Every second and every fourth step of one flow, compared with the steps left out."""
-    whole, errors = turned(name, 32, 24), []
+    full, errors = turned(name, 32, 24), []
     for stride in (4, 2):
-        some = replace(whole, from_start=whole.from_start[::stride], to_end=whole.to_end[::stride])
+        some = replace(full, from_start=full.from_start[::stride], to_end=full.to_end[::stride])
         parts = np.arange(stride // 2, 24, stride) / 24
         errors.append(
             max(
                 np.abs(one(part).displacement - other(part).displacement).max()
                 for part in parts
-                for one, other in ((some.since_start, whole.since_start), (some.until_end, whole.until_end))
+                for one, other in ((some.since_start, full.since_start), (some.until_end, full.until_end))
             )
         )
     assert 1.6 < falls(errors)[0] < 2.4 and errors[1] < 0.003, errors
 
 
-def test_twice_as_many_steps_tell_the_same_between_them_to_first_order(name):
-    """Implicit diffusion and forces a step at a time are of first order; maps between steps are not worse."""
+def test_maps_between_steps_converge_to_first_order_in_the_step(name):
+    """Implicit diffusion and forces by steps are of first order; so are maps between steps."""
     runs, parts = [turned(name, 48, steps) for steps in (12, 24, 48)], (np.arange(12) + 0.5) / 12
     for way in ("since_start", "until_end"):
         differences = [
@@ -170,8 +170,8 @@ def test_twice_as_many_steps_tell_the_same_between_them_to_first_order(name):
         assert 0.8 < falls(differences)[0] < 1.2, differences
 
 
-def test_a_part_a_cell_is_the_same_as_each_part_alone(name):
-    """Both ways, whatever the neighbours' parts are."""
+def test_a_time_for_each_cell_equals_each_time_alone(name):
+    """For both maps, with any times of the neighbours."""
     passage = turned(name, 32, 6)
     parts = np.random.default_rng(3).integers(0, 9, (24, 32)) / 8
     for way in (passage.since_start, passage.until_end):

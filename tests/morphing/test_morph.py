@@ -1,4 +1,4 @@
-"""A morph begins as the one picture and ends as the other; between, what corresponds lies at one place."""
+"""A morph begins with one picture and ends with the other; corresponding points coincide in between."""
 
 import math
 
@@ -56,13 +56,13 @@ def flatten(width, height, value):
 
 
 def quick(a, b, points=(((0.4, 0.3), (0.45, 0.3)),), **settings):
-    """A morph whose search is stopped at once: points are not where they should be, all else is."""
+    """A morph whose search is stopped at once: only its residuals are large."""
     settings = {"cells": 24, "progress": lambda progress: True, **settings}
     return morph(a, b, points, 0.5, 8, **settings)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_ends_are_the_pictures_to_the_bit(morph_of, name):
+def test_the_first_and_last_frames_are_the_pictures_bit_for_bit(morph_of, name):
     found = morph_of(name)
     frames = list(found.frames())
     assert len(frames) == found.frame_count == found.settings.timeline.frames
@@ -89,7 +89,7 @@ def test_points_arrive_in_both_pictures_and_nothing_folds(morph_of, name):
 
 
 def middle(found):
-    """The frame in which points are half way: curves are linear."""
+    """The frame in which points are half way, with linear curves."""
     frames = list(found.frames())
     return frames[len(frames) // 2].picture.pixels
 
@@ -116,7 +116,7 @@ def test_between_a_picture_and_its_copy_turned_is_the_picture_half_turned(morph_
     np.testing.assert_allclose(found.match.tracks[-1], [rotated(point, ANGLE) for point in RING], atol=2e-3)
 
 
-def test_the_light_of_stripes_is_not_lost_between(morph_of):
+def test_stripes_keep_their_contrast_between_the_pictures(morph_of):
     """Where two copies lie beside one another contrast fades; a morph keeps it, whatever the time."""
     found = morph_of("turn")
     contrast = [frame.picture.pixels[32:96, 32:96].std() for frame in found.frames()]
@@ -125,7 +125,7 @@ def test_the_light_of_stripes_is_not_lost_between(morph_of):
     assert dissolve[32:96, 32:96].std() < 0.85 * contrast[0]
 
 
-def test_what_corresponds_lies_at_one_place_in_both_warped_pictures(morph_of):
+def test_corresponding_points_coincide_in_both_warped_pictures(morph_of):
     """Dots at the points of A and at those of B: their centroids meet where the followed points are.
 
     Weights of 0 and of 1 show each warped picture alone. A residual is up to 0.5 / 512, 0.23 px, in each.
@@ -155,8 +155,8 @@ def test_maps_of_a_frame_lead_from_it_to_both_pictures(morph_of):
         np.testing.assert_allclose(frame.to_map.source_at(here), ends, atol=2 * TOLERANCE)
 
 
-def test_with_a_linear_curve_points_go_evenly(morph_of):
-    """All together, as far from frame to frame; soft starts and stops are the other curve's."""
+def test_with_a_linear_curve_points_move_at_constant_speed(morph_of):
+    """All points move by equal distances from frame to frame."""
     found = morph_of("dots")
     steps = [
         np.linalg.norm(np.diff([frame.points for frame in one.frames()], axis=0), axis=2).sum(axis=1)
@@ -169,7 +169,7 @@ def test_with_a_linear_curve_points_go_evenly(morph_of):
     np.testing.assert_allclose(last.points, [to for _, to in POINTS], atol=TOLERANCE)
 
 
-def test_a_picture_that_becomes_itself_is_still(device_name):
+def test_a_morph_of_a_picture_into_itself_is_still(device_name):
     """A point that corresponds to itself: every frame is the picture, but for the look-up's rounding."""
     picture, points = waves(), [((0.3, 0.2), (0.3, 0.2))]
     found = morph(picture, picture, points, 0.5, 6, cells=16, device=device_name)
@@ -193,7 +193,7 @@ def test_the_blend_follows_its_curve_and_its_light(morph_of):
 
 
 def test_the_warp_follows_its_curve(morph_of):
-    """Points have the curve's value of their nearly straight ways behind them, whatever the blend does."""
+    """The covered fraction of the nearly straight ways is the curve's value, for any blend curve."""
     found = going(morph_of("dots"), warp_curve={0.25: 0.8}, blend_curve="ease")
     starts, ends = np.swapaxes(POINTS, 0, 1)
     values = np.interp(np.linspace(0, 1, 7), [0, 0.5, 1], [0, 0.8, 1])
@@ -205,8 +205,8 @@ def test_the_warp_follows_its_curve(morph_of):
 # A mask
 
 
-def test_where_the_mask_is_white_it_is_the_second_picture_when_black_is_still_the_first(morph_of):
-    """A delay of half the time: half way, white has arrived and black not begun, in warp and in blend."""
+def test_white_of_a_mask_shows_the_second_picture_while_black_shows_the_first(morph_of):
+    """With a delay of half the time, white is complete half way and black has not started."""
     flats = of_pictures(morph_of("dots"), flatten(SIDE, HEIGHT, 0.25), flatten(SIDE, HEIGHT, 0.75))
     found = going(flats, mask=Painted(SPLIT), delay=0.5)
     frames = list(found.frames())
@@ -222,15 +222,15 @@ def test_where_the_mask_is_white_it_is_the_second_picture_when_black_is_still_th
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.3, 0.9])
-def test_with_a_mask_the_ends_are_still_the_pictures_to_the_bit(morph_of, delay):
+def test_with_a_mask_the_ends_are_the_pictures_bit_for_bit(morph_of, delay):
     found = going(morph_of("dots"), mask=Painted(SPLIT), delay=delay)
     first, *_, last = found.frames()
     np.testing.assert_array_equal(first.picture.pixels, found.pair.a.pixels)
     np.testing.assert_array_equal(last.picture.pixels, found.pair.b.pixels)
 
 
-def test_a_sharp_mask_is_softened_for_the_warp_and_that_is_said(morph_of):
-    """A jump in time where the flow goes 2.9 cells across it folds; the blend keeps the sharp mask."""
+def test_a_sharp_mask_is_softened_for_the_warp_with_a_note(morph_of):
+    """A jump in timing across which the flow moves by 2.9 cells folds; the blend keeps the sharp mask."""
     upper = np.repeat((np.arange(80) < 40)[:, None], 120, axis=1).astype(float)
     found = going(morph_of("dots"), mask=Painted(upper), delay=0.5)
     frames = list(found.frames())
@@ -248,7 +248,7 @@ def test_a_sharp_mask_is_softened_for_the_warp_and_that_is_said(morph_of):
     assert half.picture.pixels[78].min() > 1 - 1e-6 and half.picture.pixels[81].max() < 1e-6
 
 
-def test_a_soft_mask_or_no_delay_is_left_as_it_is(morph_of):
+def test_a_soft_mask_or_one_without_delay_is_not_changed(morph_of):
     soft = Painted(np.linspace(1, 0, 120)[None, :] * np.ones((80, 1)))
     for settings in ({"mask": soft, "delay": 0.3}, {"mask": Painted(SPLIT), "delay": 0.0}):
         found = going(morph_of("dots"), **settings)
@@ -281,7 +281,7 @@ def test_reverse_is_the_frames_in_reverse_bit_for_bit(morph_of, mask):
 
 @pytest.mark.parametrize("reverse", [False, True])
 def test_pingpong_goes_back_without_showing_an_end_twice(morph_of, reverse):
-    """0 1 2 … n - 1 … 2 1: shown again and again no frame stands twice."""
+    """0 1 2 … n - 1 … 2 1: repeated, no frame is shown twice in a row."""
     plain = going(morph_of("dots"), reverse=reverse)
     fit_to_loop = going(plain, pingpong=True)
     frames, once = pixels_of(fit_to_loop), pixels_of(plain)
@@ -304,7 +304,7 @@ def test_frames_are_in_order(reverse, pingpong, order):
 
 
 def test_two_frames_are_both_pictures():
-    """The shortest morph there is; there and back is the same two."""
+    """The shortest morph; with pingpong it has the same two frames."""
     assert (
         MorphSettings(Timeline(0.1, 10)).order
         == MorphSettings(Timeline(0.1, 10), pingpong=True).order
@@ -316,8 +316,8 @@ def test_two_frames_are_both_pictures():
 
 
 @pytest.mark.parametrize("fit", ["fill", "fit", "stretch"])
-def test_pictures_of_another_size_and_aspect_end_as_their_fit_says(device_name, fit):
-    """The last frame is what is seen of B, resampled by OpenImageIO; its points are where B's are seen."""
+def test_pictures_of_another_size_and_aspect_end_fitted(device_name, fit):
+    """The last frame is the visible part of B, resampled by OpenImageIO; its points are those of B."""
     a, (x, y) = dots([(0.4, 0.4)], width=96, height=64), (0.5, 0.4)
     b = dots([(x, y)], spread=3.0, width=100, height=80)
     found = quick(a, b, [((0.4, 0.4), (x, y))], fit=fit, device=device_name)
@@ -332,7 +332,7 @@ def test_pictures_of_another_size_and_aspect_end_as_their_fit_says(device_name, 
     np.testing.assert_allclose(np.multiply(place, 96), left, rtol=0.01)
 
 
-def test_frames_of_another_size_end_as_both_pictures_shrunk(device_name):
+def test_small_frames_begin_and_end_with_the_reduced_pictures(device_name):
     a, b = dots([(0.4, 0.3)], 6.0), dots([(0.45, 0.3)], 6.0)
     first, *_, last = quick(a, b, width=120, height=80, device=device_name).frames()
     for frame, picture in ((first, a), (last, b)):
@@ -350,7 +350,7 @@ def test_grey_becomes_coloured(device_name):
 
 @pytest.mark.parametrize("light", ["linear", "display"])
 def test_an_opaque_picture_becomes_a_transparent_one(device_name, light):
-    """Alpha goes from 1 to 0 by the curve; no colour is left where there is no alpha."""
+    """Alpha falls from 1 to 0 by the curve; transparent pixels have no colour."""
     solid, clear = noise(48, 32), Picture(np.zeros((32, 48, 4), np.float32), alpha=3)
     frames = list(quick(solid, clear, blend=light, blend_curve="linear", device=device_name).frames())
     for frame, part in zip(frames, np.linspace(0, 1, len(frames)), strict=True):
@@ -383,7 +383,7 @@ def test_a_transparent_edge_gives_both_pictures_their_alpha(device_name):
         ([((0.5, 0.3), (0.5, 0.3)), ((0.5, 0.3), (0.6, 0.3))], "two destinations"),
     ],
 )
-def test_points_that_make_no_sense_are_refused(points, says):
+def test_invalid_points_are_refused(points, says):
     with pytest.raises(ValueError, match=says):
         quick(noise(60, 40), noise(60, 50), points)
 
@@ -406,7 +406,7 @@ def test_points_may_be_rows_of_four_numbers(device_name):
         ({"mask": Painted(np.full((2, 2), 1.5))}, "a timing mask: expected values 0 … 1"),
     ],
 )
-def test_a_course_that_makes_no_sense_is_refused(settings, says):
+def test_invalid_settings_are_refused(settings, says):
     with pytest.raises(ValueError, match=says):
         MorphSettings(Timeline(0.5, 8), **settings)
 
@@ -425,7 +425,7 @@ def test_the_same_seed_gives_the_same_frames(device_name):
 
 
 def test_a_mask_may_be_an_array(morph_of):
-    """Frames with it are those with the painting of it."""
+    """The frames equal those with the array as `Painted`."""
     found = going(morph_of("dots"), mask=np.array(SPLIT))
     painted = going(morph_of("dots"), mask=Painted(SPLIT))
     for one, other in zip(found.frames(), painted.frames(), strict=True):

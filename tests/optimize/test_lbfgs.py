@@ -621,14 +621,14 @@ def test_resuming_equals_an_uninterrupted_minimisation(name):
     problem = BY_NAME[name]
     states = []
     settings = Settings(iterations=60, evaluations=1000)
-    whole = minimise(problem.value_and_gradient, problem.start, settings, states.append)
+    complete = minimise(problem.value_and_gradient, problem.start, settings, states.append)
     for state in states[:: len(states) // 6]:
-        assert same(minimise(problem.value_and_gradient, state, settings), whole)
+        assert same(minimise(problem.value_and_gradient, state, settings), complete)
     for stop in ({"iterations": 7}, {"evaluations": 11}, {"evaluations": 12}, {"evaluations": 13}):
         part = minimise(problem.value_and_gradient, problem.start, replace(settings, **stop))
         going_on = minimise(problem.value_and_gradient, part.state, settings)
-        assert same(going_on, whole) and going_on.evaluations == whole.evaluations
-        assert going_on.history == whole.history and going_on.status is whole.status
+        assert same(going_on, complete) and going_on.evaluations == complete.evaluations
+        assert going_on.history == complete.history and going_on.status is complete.status
 
 
 def test_a_state_keeps_the_lowest_point():

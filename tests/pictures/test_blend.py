@@ -1,4 +1,4 @@
-"""Two pictures of one kind mixed: of light, or of the numbers that a display is sent."""
+"""Blends of two pictures, in linear light or in display values."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,11 @@ from wfluid.domain.limits import BLEND_SPACES
 from wfluid.pictures.blend import blended, check_light
 
 HALF_GREY = ((0.5 + 0.055) / 1.055) ** 2.4
-"""The light of sRGB's 0.5, by its definition (IEC 61966-2-1)."""
+"""Linear light of the sRGB value 0.5 (IEC 61966-2-1)."""
 
 
 def noise(seed, channels=3, alpha=None):
-    """Colours within 0.1 … 0.9 of their alpha, which is within 0.2 … 1."""
+    """Random premultiplied colours: alpha 0.2 … 1, colours 0.1 … 0.9 of alpha."""
     rng = np.random.default_rng(seed)
     pixels = rng.uniform(0.1, 0.9, (6, 9, channels)).astype(np.float32)
     if alpha is not None:
@@ -32,7 +32,7 @@ def flatten(value, channels=3, **settings):
 
 
 @pytest.mark.parametrize("alpha", [None, 3])
-def test_light_is_mixed_by_parts(alpha):
+def test_linear_light_is_mixed_by_weights(alpha):
     """(1 - w) a + w b, of premultiplied colours and of alpha alike."""
     a, b = noise(0, 4, alpha), noise(1, 4, alpha)
     for weight in (0.25, 0.7):
@@ -40,20 +40,20 @@ def test_light_is_mixed_by_parts(alpha):
         np.testing.assert_allclose(blended(a, b, weight).pixels, wanted, rtol=0, atol=2e-7)
 
 
-def test_black_and_white_are_half_of_the_light_or_half_of_the_code():
+def test_half_black_half_white_is_half_the_light_or_half_the_code():
     black, white = flatten(0), flatten(1)
     np.testing.assert_allclose(blended(black, white, 0.5, "linear").pixels, 0.5, rtol=1e-6)
     np.testing.assert_allclose(blended(black, white, 0.5, "display").pixels, HALF_GREY, rtol=1e-6)
 
 
-def test_display_values_are_mixed_by_parts():
+def test_display_values_are_mixed_by_weights():
     a, b = noise(0), noise(1)
     mixed = shown(blended(a, b, 0.3, "display").pixels)
     np.testing.assert_allclose(mixed, 0.7 * shown(a.pixels) + 0.3 * shown(b.pixels), rtol=0, atol=1e-6)
 
 
-def test_display_values_are_those_of_what_is_not_multiplied_and_alpha_is_mixed_as_it_is():
-    """A transparent white and an opaque black: codes, each by its alpha, as a display's compositor does."""
+def test_display_values_are_of_straight_colours_and_alpha_is_mixed_linearly():
+    """Transparent white and opaque black: sRGB codes weighted by alpha, as in a display's compositor."""
     a, b = noise(0, 4, 3), noise(1, 4, 3)
     mixed = blended(a, b, 0.3, "display").pixels.astype(float)
     codes = [shown(one.pixels[..., :3] / one.pixels[..., 3:]) * one.pixels[..., 3:] for one in (a, b)]
@@ -67,8 +67,8 @@ def test_display_values_are_those_of_what_is_not_multiplied_and_alpha_is_mixed_a
 
 
 @pytest.mark.parametrize("light", BLEND_SPACES)
-def test_what_is_transparent_gives_no_colour(light):
-    """A clear pixel fades the other's alpha and leaves its colour."""
+def test_transparent_pixels_contribute_no_colour(light):
+    """A transparent pixel reduces the other's alpha and keeps its straight colour."""
     clear, red = np.zeros((2, 3, 4), np.float32), np.zeros((2, 3, 4), np.float32)
     red[..., [0, 3]] = 1
     mixed = blended(Picture(clear, alpha=3), Picture(red, alpha=3), 0.25, light).pixels
@@ -77,7 +77,7 @@ def test_what_is_transparent_gives_no_colour(light):
 
 @pytest.mark.parametrize("light", BLEND_SPACES)
 @pytest.mark.parametrize("alpha", [None, 3])
-def test_none_or_all_of_it_is_the_picture_to_the_bit(light, alpha):
+def test_a_weight_of_0_or_1_gives_a_picture_bit_for_bit(light, alpha):
     a, b = noise(0, 4, alpha), noise(1, 4, alpha)
     for zero, one in ((0, 1), (0.0, 1.0), (np.zeros((6, 9)), np.ones((6, 9)))):
         np.testing.assert_array_equal(blended(a, b, zero, light).pixels, a.pixels)
@@ -86,7 +86,7 @@ def test_none_or_all_of_it_is_the_picture_to_the_bit(light, alpha):
 
 @pytest.mark.parametrize("light", BLEND_SPACES)
 def test_every_pixel_has_its_own_weight(light):
-    """As if each were blended alone."""
+    """Each pixel is blended by its own weight."""
     a, b, weight = noise(0), noise(1), np.random.default_rng(2).random((6, 9))
     weight[0, :2] = 0, 1
     mixed = blended(a, b, weight, light).pixels
@@ -95,24 +95,24 @@ def test_every_pixel_has_its_own_weight(light):
         np.testing.assert_allclose(mixed[row, column], alone, rtol=0, atol=1e-6)
 
 
-def test_both_lights_agree_where_the_pictures_do():
+def test_both_spaces_give_the_same_for_equal_pictures():
     """To the accuracy of the transfer function and its inverse in single precision."""
     a = noise(0)
     for light in BLEND_SPACES:
         np.testing.assert_allclose(blended(a, a, 0.37, light).pixels, a.pixels, rtol=2e-6)
 
 
-def test_numbers_that_are_no_colours_know_no_display():
+def test_data_is_mixed_without_display_values():
     a, b = flatten(0.0, data=True), flatten(1.0, data=True)
     np.testing.assert_allclose(blended(a, b, 0.5, "display").pixels, 0.5, rtol=1e-6)
 
 
-def test_a_mix_is_of_the_first_pictures_kind():
+def test_a_blend_has_the_type_and_metadata_of_the_first_picture():
     a, b = flatten(0.2, dtype="uint8"), flatten(0.4, dtype="half")
     for weight in (0, 0.5, 1):
         assert blended(a, b, weight).dtype == "uint8"
 
 
-def test_a_light_that_does_not_exist_is_refused():
+def test_an_unknown_space_is_refused():
     with pytest.raises(ValueError, match="blend in 'gamma' light: expected one of linear, display"):
         check_light("gamma")

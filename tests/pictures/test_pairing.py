@@ -1,4 +1,4 @@
-"""The second picture covers the first one's frame: filled, fitted or stretched, and of the same channels."""
+"""The second picture is fitted to the first one's frame, with the same channels."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SIZES = [
 @pytest.mark.parametrize(("size", "frame"), SIZES)
 @pytest.mark.parametrize("how", FITS)
 def test_a_window_has_the_frames_aspect_to_half_a_pixel_and_lies_in_the_middle(size, frame, how):
-    """Filled it lies within the picture, fitted around it; either touches it along one axis."""
+    """With "fill" the window lies within the picture, with "fit" around it; both touch it along one axis."""
     found = window(size, frame, how)
     x, y, width, height = found.x, found.y, found.width, found.height
     assert min(width, height) >= 1
@@ -42,7 +42,7 @@ def test_a_window_has_the_frames_aspect_to_half_a_pixel_and_lies_in_the_middle(s
 
 
 @pytest.mark.parametrize("how", FITS)
-def test_a_picture_of_the_same_aspect_is_seen_whole(how):
+def test_a_picture_of_the_same_aspect_is_not_cropped(how):
     for size in ((60, 40), (3, 2), (1500, 1000)):
         assert window(size, (600, 400), how) == Window(0, 0, *size)
 
@@ -66,8 +66,8 @@ def noise(width, height, channels=3, seed=0):
         Window(-1, 2, 30, 5),
     ],
 )
-def test_what_is_seen_is_the_pixels_of_the_window_and_black_beyond(through):
-    """Pixel by pixel, by the definition."""
+def test_cropping_gives_the_pixels_of_the_window_and_black_beyond(through):
+    """Compared pixel by pixel with the definition."""
     picture = noise(20, 12)
     got = cropped(picture, through).pixels
     assert got.shape == (through.height, through.width, 3)
@@ -78,7 +78,7 @@ def test_what_is_seen_is_the_pixels_of_the_window_and_black_beyond(through):
             np.testing.assert_array_equal(got[row, column], picture.pixels[y, x] if inside else 0)
 
 
-def test_a_picture_that_is_seen_whole_is_the_same_object():
+def test_a_picture_that_is_not_cropped_is_the_same_object():
     picture = noise(20, 12)
     assert cropped(picture, Window(0, 0, 20, 12)) is picture
     assert cropped(picture, Window(1, 0, 19, 12)) is not picture
@@ -95,7 +95,7 @@ def test_bars_are_transparent_where_there_is_alpha():
 @pytest.mark.parametrize(
     ("size", "frame"), [((61, 40), (48, 48)), ((40, 75), (80, 60)), ((90, 31), (61, 47))]
 )
-def test_a_dot_is_seen_at_the_place_of_its_point(how, size, frame):
+def test_a_dot_appears_at_the_place_of_its_point(how, size, frame):
     """Painted into the second picture at p, stretched over the frame, its light is centred on place(p).
 
     Stretching by OpenImageIO's triangle filter, which keeps first moments within the picture.
@@ -124,13 +124,13 @@ def test_corners_of_the_window_are_corners_of_the_frame():
 @pytest.mark.parametrize("point", [(-0.1, 5), (40.1, 5), (5, -1), (5, 60.5), (float("nan"), 5)])
 @pytest.mark.parametrize("how", FITS)
 def test_a_point_outside_the_second_picture_is_refused(how, point):
-    """Bars are outside too."""
+    """Points in bars count as outside."""
     pair = paired(noise(64, 48), noise(40, 60), how)
     with pytest.raises(ValueError, match="of the second picture lies outside it, 40 x 60"):
         pair.place(point, (1.0, 0.75))
 
 
-def test_a_point_that_filling_cuts_off_is_refused_and_fitting_shows_it():
+def test_a_cropped_point_is_refused_with_fill_and_accepted_with_fit():
     a, b = noise(64, 48), noise(40, 60)
     with pytest.raises(ValueError, match="the point 20,5 of the second picture is cut off: fit or stretch"):
         paired(a, b, "fill").place((20, 5), (1.0, 0.75))
@@ -150,7 +150,7 @@ def with_alpha(picture, at):
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_grey_beside_colours_becomes_colours_and_that_is_said(swapped):
+def test_grey_beside_colours_becomes_colours_with_a_note(swapped):
     grey, colours = noise(4, 3, 1), noise(4, 3, 3)
     pair = (colours, grey) if swapped else (grey, colours)
     found = alike(*pair)
@@ -163,8 +163,8 @@ def test_grey_beside_colours_becomes_colours_and_that_is_said(swapped):
 
 @pytest.mark.parametrize("at", [0, 3])
 @pytest.mark.parametrize("swapped", [False, True])
-def test_what_has_no_alpha_is_opaque_beside_what_has_and_that_is_said(swapped, at):
-    """Wherever the file has its alpha; colours keep their order."""
+def test_a_picture_without_alpha_becomes_opaque_with_a_note(swapped, at):
+    """For any position of alpha; colours keep their order."""
     clear, solid = with_alpha(noise(4, 3), at), noise(4, 3, seed=1)
     pair = (clear, solid) if swapped else (solid, clear)
     found = alike(*pair)
@@ -190,7 +190,7 @@ def test_other_numbers_of_channels_are_refused(one, other):
         paired(noise(4, 3, one), noise(4, 3, other), "fill")
 
 
-def test_numbers_and_colours_are_refused():
+def test_data_and_colours_are_refused():
     numbers = Picture(noise(4, 3).pixels, data=True)
     for pair in ((numbers, noise(4, 3)), (noise(4, 3), numbers)):
         with pytest.raises(ValueError, match="one picture has colours, the other numbers"):

@@ -1,4 +1,4 @@
-"""Pictures through files: types, channels, linear light, alpha."""
+"""Reading and writing pictures: types, channels, linear light, alpha."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -81,7 +81,7 @@ def test_unassociated_alpha_is_linearised_then_premultiplied(tmp_path):
     assert picture.pixels[0, 0] == pytest.approx([0.5029 * 128 / 255] * 3 + [128 / 255], abs=1e-4)
 
 
-def test_the_fast_encoding_is_the_exact_one():
+def test_the_fast_encoding_equals_the_exact_one():
     """The table over the square root gives the code of the exact formula; each code returns to itself."""
     codes = np.arange(256, dtype=np.uint8)
     np.testing.assert_array_equal(color.encode(color.decode(codes, srgb=True), "uint8", srgb=True), codes)
@@ -100,7 +100,7 @@ def test_the_fast_encoding_is_the_exact_one():
         ("text.jpg", b"this is no picture at all\n", "not a picture"),
     ],
 )
-def test_unreadable_pictures_are_refused_by_name(tmp_path, name, content, says):
+def test_unreadable_pictures_are_refused_with_their_name(tmp_path, name, content, says):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(PictureError, match=says) as refusal:
@@ -127,7 +127,7 @@ def test_unknown_endings_are_refused_with_the_known_ones(tmp_path):
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
-def test_exif_orientation_is_honoured(tmp_path, orientation):
+def test_exif_orientation_is_applied(tmp_path, orientation):
     """Red marks the top-left of the upright picture, green its top-right (EXIF 2.32, figure 15)."""
     upright = np.zeros((24, 40, 3), np.uint8)
     upright[:8, :8, 0] = 255
@@ -158,7 +158,7 @@ def test_exif_orientation_is_honoured(tmp_path, orientation):
     np.testing.assert_array_equal(read_picture(tmp_path / "b.tif").pixels, picture.pixels)
 
 
-def test_further_channels_metadata_and_windows_travel(tmp_path):
+def test_further_channels_metadata_and_windows_are_kept(tmp_path):
     """Seven channels with their names, an attribute, a display window larger than the data."""
     spec = oiio.ImageSpec(20, 12, 7, "float")
     spec.channelnames = ("R", "G", "B", "A", "Z", "id.x", "id.y")
@@ -181,7 +181,7 @@ def test_further_channels_metadata_and_windows_travel(tmp_path):
 
 
 def test_premultiplied_edges_do_not_darken(tmp_path, device):
-    """A white disc on transparent black, moved: where there is colour it stays white."""
+    """A moved white disc on transparent black stays white wherever it is visible."""
     from wfluid import Fluid, GaussianForce, animate
 
     x, y = np.arange(80), np.arange(80)[:, None]

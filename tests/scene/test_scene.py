@@ -57,9 +57,13 @@ HERE = "[[force]]  # here\n"
         ("wfluid = 1", "wfluid = 1\nmotion = 3  # here", "motion: no such key"),
         # keys that are missing: the table's line
         ('[[force]]\nkind = "push"', "[[force]]  # here", "force.0: kind is missing: expected one of push"),
-        (PUSH + "by", HERE + 'kind = "push"\nat', "force.0: by is missing: the arrow"),
-        ('[picture]\nfile = "small.png"', "[picture]  # here", "picture: file is missing: the picture"),
-        ('[[layer]]\nname = "matte"', "[[layer]]  # here", "layer.0: name is missing: what it is called"),
+        (PUSH + "by", HERE + 'kind = "push"\nat', "force.0: by is missing: displacement of the centre"),
+        (
+            '[picture]\nfile = "small.png"',
+            "[picture]  # here",
+            "picture: file is missing: file of the picture",
+        ),
+        ('[[layer]]\nname = "matte"', "[[layer]]  # here", "layer.0: name is missing: name of the layer"),
         # values of a wrong type or range
         ("duration = 0.2", 'duration = "long"  # here', "time.duration: 'long': expected a number above 0\n"),
         ("fps = 10", "fps = true  # here", "time.fps: True: expected a number from 0.01 to 1000"),
@@ -82,21 +86,33 @@ HERE = "[[force]]  # here\n"
         (
             'group = "nose"',
             'group = "nos"  # here',
-            "force.0.group: 'nos': no such group; there is nose; did",
+            "force.0.group: 'nos': no such group; expected one of nose; did",
         ),
-        ('= "swell"', '= "swel"  # here', "force.0.envelope: 'swel': no such envelope; there is swell; did"),
-        ('"matte"\nfile', '"ink"\nfile', "density.0.name: 'ink' is taken: outputs could not tell them apart"),
-        ('of = "matte"', 'of = "mate"  # here', "output.1.of: 'mate': no such of; there is picture, tracks"),
+        (
+            '= "swell"',
+            '= "swel"  # here',
+            "force.0.envelope: 'swel': no such envelope; expected one of swell; did",
+        ),
+        (
+            '"matte"\nfile',
+            '"ink"\nfile',
+            "density.0.name: 'ink' is taken: give layers and densities different names",
+        ),
+        (
+            'of = "matte"',
+            'of = "mate"  # here',
+            "output.1.of: 'mate': no such of; expected one of picture, tracks",
+        ),
         (
             EYE,
             'kind = "buoyancy"\nby = [0, 9]\ndensity = "oil"  # here',
-            "'oil': no such density; there is ink",
+            "'oil': no such density; expected one of ink",
         ),
         # values that contradict, or lie outside: their table
         (PUSH, HERE + 'kind = "push"\n', "force.0: push: expected either center or path"),
         (PUSH, HERE + PUSH[10:] + "path = [[0, 1, 2], [1, 3, 4]]\n", "force.0: push: expected either"),
         (PUSH, HERE + 'kind = "push"\ncenter = [61, 20]\n', "61,20: outside the picture of 60 x 40 pixels"),
-        (PUSH, HERE + PUSH[10:] + "at = 0.1\nend = 0.2\n", "force.0: push: at= is one blow; it goes without"),
+        (PUSH, HERE + PUSH[10:] + "at = 0.1\nend = 0.2\n", "force.0: push: at= is an impulse: leave out"),
         (PUSH, HERE + PUSH[10:] + "start = 0.2\n", "force.0: push start=0.2: the animation lasts 0.2 s"),
         (PUSH, HERE + PUSH[10:] + "start = 0.1\nend = 0.1\n", "force.0: push: end 0.1 is not after start"),
         (PUSH, HERE + PUSH[10:] + "phase = 0.1\n", "force.0: push: phase= needs period="),
@@ -111,7 +127,7 @@ HERE = "[[force]]  # here\n"
         (
             "[[layer]]",
             "[frames]  # here\nwidth = 9\nscale = 2\n[[layer]]",
-            "frames: width and scale both say",
+            "frames: width and scale both set",
         ),
         (
             "[[layer]]",
@@ -199,9 +215,9 @@ def test_what_makes_no_sense_together_is_said_with_its_key_and_line(shots, capsy
         ("[time]", '[effect]\nmask = "none.png"\n[time]', "effect.mask: shots/none.png: no such picture"),
         ("[time]", '[viscosity]\nimage = "none.png"\n[time]', "viscosity: shots/none.png: no such picture"),
         ("center = [20, 20]", 'image = "none.png"', "density.0: shots/none.png: no such picture"),
-        ("o.####.png", "small.png", "shots/small.png: that is the picture itself; write to another name"),
-        ("o.####.png", "right.png", "shots/right.png: that is a picture that is read; write to another name"),
-        ("o.####.png", "m.1002.png", "that is written as the picture; write to another name"),
+        ("o.####.png", "small.png", "shots/small.png is the picture itself: write to another name"),
+        ("o.####.png", "right.png", "shots/right.png is an input of the scene: write to another name"),
+        ("o.####.png", "m.1002.png", "is the output of 'picture': write to another name"),
         ("o.####.png", "shot.####.toml", "unknown picture format '.toml'"),
         ("o.####.png", "none/o.####.png", "shots/none: no such folder; make it first"),
         ("o.####.png", "o.png", "shots/o.png: cannot tell the output's kind; name it x.gif"),
@@ -212,7 +228,7 @@ def test_what_makes_no_sense_together_is_said_with_its_key_and_line(shots, capsy
             '"where.txt"\nof = "tracks"\n[tracks]\npoints = [[1, 1]]',
             "shots/where.txt: tracks are written as .csv",
         ),
-        ('"o.####.png"', '"where.csv"\nof = "tracks"', "no point is followed"),
+        ('"o.####.png"', '"where.csv"\nof = "tracks"', "no points to follow"),
     ],
 )
 def test_files_that_cannot_be_are_refused(shots, capsys, old, new, says):
@@ -231,7 +247,7 @@ def test_files_that_cannot_be_are_refused(shots, capsys, old, new, says):
         (("--set", "tiem.duration=3"), "tiem: no such key; did you mean time?\n"),
         (("--set", "time.duration=-3"), "time.duration: -3: expected a number above 0\n"),
         (("--set", "time.duration=long"), "time.duration: 'long': expected a number above 0\n"),
-        (("--set", "time.fps.x=3"), "--set 'time.fps.x=3': time.fps is a value, not a table\n"),
+        (("--set", "time.fps.x=3"), "--set 'time.fps.x=3': time.fps is a value: expected a table\n"),
         (("--set", "time=3"), "time: expected a table, [time]\n"),
         (("--set", "force.2.turn=3"), "--set 'force.2.turn=3': no item '2' of 2\n"),
         (("--set", "force.eyes.turn=3"), "no item 'eyes' of 2; did you mean eye?\n"),
@@ -239,13 +255,13 @@ def test_files_that_cannot_be_are_refused(shots, capsys, old, new, says):
         (("--set", "force.eye.kind=push"), "force.1.turn: no such key"),
         (("--set", "picture.file=none.png"), "shots/none.png: no such picture\n"),
         (("--set", "wfluid=2"), "wfluid: 2: a scene of a newer version"),
-        (("--set", "output.0.file=small.png"), "that is the picture itself"),
-        (("-o", "shots/small.png"), "that is the picture itself"),
+        (("--set", "output.0.file=small.png"), "is the picture itself"),
+        (("-o", "shots/small.png"), "is the picture itself"),
         (("-o", "a.xyz"), "cannot tell the output's kind"),
-        (("-o", "a.gif", "-o", "a.gif"), "a.gif: that is written as the picture"),
-        (("--report", "shots/shot.toml"), "shots/shot.toml: that is "),
+        (("-o", "a.gif", "-o", "a.gif"), "a.gif is the output of 'picture'"),
+        (("--report", "shots/shot.toml"), "shots/shot.toml is "),
         (("--report", "none/r.json"), "none: no such folder"),
-        (("--preview", "shots/right.png"), "that is a picture that is read"),
+        (("--preview", "shots/right.png"), "is an input of the scene"),
     ],
 )
 def test_mistakes_beside_the_scene_are_refused(shots, capsys, options, says):
@@ -271,7 +287,7 @@ def test_a_scene_that_moves_nothing_or_writes_nothing_is_refused(shots, capsys):
     (shots / "shot.toml").write_text(SHOT.replace(moves, ""))
     assert "nothing moves the picture" in refused(capsys, shots)
     (shots / "shot.toml").write_text(SHOT[: SHOT.index("[[output]]")])
-    assert "where to? give -o OUT" in refused(capsys, shots)
+    assert "no output: give -o OUT" in refused(capsys, shots)
 
 
 def test_sizes_beyond_the_memory_are_refused(shots, capsys, monkeypatch):

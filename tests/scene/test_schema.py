@@ -285,7 +285,7 @@ def test_the_nearest_key_is_asked_for(path, wrong, right):
         ({"output": [{"file": "a.gif", "of": "lairy"}], "layer": [{"name": "layer", "file": "a"}]}, "layer?"),
         ({"layer": [{"name": "tracks", "file": "a.png"}]}, "layer.0.name: 'tracks' is taken"),
         ({"density": [{"name": "a"}], "layer": [{"name": "a", "file": "b"}]}, "density.0.name: 'a' is taken"),
-        ({"picture": None}, "[picture] is missing: what is animated"),
+        ({"picture": None}, "[picture] is missing: give the file"),
     ],
 )
 def test_names_that_do_not_fit_together_are_refused(scene, says):

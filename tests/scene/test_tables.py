@@ -1,13 +1,15 @@
-"""A scene is an object a table, and a field of its class is all that is said of a key."""
+"""Each table of a scene is an object, and a field of its class defines everything about a key."""
 
 import argparse
+from contextlib import redirect_stdout
 from dataclasses import fields
+from io import StringIO
 
 import pytest
 
 from wfluid.animation.animation import Animation
 from wfluid.cli.flags import add_key_flags
-from wfluid.cli.options import given_keys
+from wfluid.cli.options import given_keys, scene_of_options
 from wfluid.cli.parser import build_parser
 from wfluid.domain.limits import SCENE_FPS
 from wfluid.model.fluid import Fluid
@@ -17,9 +19,10 @@ from wfluid.scene.checking import checked, made
 from wfluid.scene.forces import PushTable, VortexTable
 from wfluid.scene.format import SCENE, FluidTable, FramesTable, FreezeTable
 from wfluid.scene.keyframes import MorphTable
-from wfluid.scene.reference import tables
+from wfluid.scene.reference import reference, tables
 from wfluid.scene.scene import Scene
-from wfluid.scene.schema import Key, SceneTable, SchemaError, key, table_of
+from wfluid.scene.schema import Key, SceneError, SceneTable, SchemaError, key, table_of
+from wfluid.scene.toml_file import read_scene, write_scene
 from wfluid.scene.types import number, whole
 
 TABLES = {
@@ -110,6 +113,40 @@ def test_a_field_is_check_default_reference_and_flag():
     assert given_keys(parser.parse_args([]), grain) == {}
 
 
+class StickyFluid(FluidTable):
+    """The fluid with one more key."""
+
+    stickiness: float = key("stickiness of walls", number(0, 9), unit="1/s", default=2.5, flag="--stickiness")
+
+
+def test_one_more_line_in_a_table_is_a_new_option_everywhere(monkeypatch, tmp_path):
+    """In the flags, the reference, the reader with its errors, --set, saved scenes and the object."""
+    monkeypatch.setitem(SCENE.keys, "fluid", table_of(StickyFluid))
+    parser = build_parser("animate")
+    with pytest.raises(SystemExit), redirect_stdout(StringIO()) as out:
+        parser.parse_args(["animate", "--help"])
+    assert "stickiness of walls [1/s] (2.5)" in " ".join(out.getvalue().split())
+    row = "| `stickiness` | stickiness of walls [1/s] | a number from 0 to 9 | 2.5 |"
+    assert row in reference().splitlines()
+
+    flags = ["animate", "a.png", "--push", "3,4:1,0", "-o", "a.gif", "--stickiness"]
+    assert scene_of_options(parser.parse_args([*flags, "3"])).fluid.stickiness == 3
+    with pytest.raises(SceneError, match=r"--stickiness 10\.0: expected a number from 0 to 9"):
+        scene_of_options(parser.parse_args([*flags, "10"]))
+
+    path = tmp_path / "a.toml"
+    path.write_text('wfluid = 1\n[picture]\nfile = "a.png"\n[fluid]\nstickiness = 4\n')
+    scene = read_scene(path)
+    assert isinstance(scene.fluid, StickyFluid) and scene.fluid.stickiness == 4
+    assert scene.with_values(["fluid.stickiness=5"]).fluid.stickiness == 5
+    assert scene.with_values(["fluid={}"]).fluid.stickiness == 2.5
+    write_scene(tmp_path / "b.toml", scene)
+    assert read_scene(tmp_path / "b.toml").fluid.stickiness == 4
+    path.write_text(path.read_text().replace("stickiness", "stickyness"))
+    with pytest.raises(SceneError, match=r"a\.toml:5: fluid\.stickyness: .* did you mean stickiness\?"):
+        read_scene(path)
+
+
 @pytest.mark.parametrize("verb", ["animate", "keyframes", "morph"])
 def test_the_help_of_a_flag_has_its_keys_meaning_and_default(verb):
     (verbs,) = [action for action in build_parser()._actions if action.dest == "verb"]
@@ -133,4 +170,4 @@ def test_a_morph_has_no_flags_that_it_has_no_use_for():
     assert not (forces | others) & vars(options).keys()
     reasons = [reason for _, _, table in tables() for reason in table.not_in_morph.values()]
     assert set(SCENE.not_in_morph) == {"effect", "force", "group", "density", "layer", "tracks"}
-    assert len(reasons) == 10 and all(reason.startswith("a morph goes without: ") for reason in reasons)
+    assert len(reasons) == 10 and all(reason.startswith("not allowed in a morph: ") for reason in reasons)

@@ -83,7 +83,7 @@ def test_row_sums_bound_the_spectrum(device, name):
         matrix, *free = stress_matrix(grid, mu, alpha, DT, names(walls))
         weights = unknowns(diffusion.system.levels[0].weights, diffusion.layout, free)
         values = np.linalg.eigvals(weights[:, None] * matrix.toarray()).real
-        stiffness = diffusion.medium.stiffness(DT)
+        stiffness = diffusion.coefficients.stiffness(DT)
         assert values.max() < 1 + 1e-12 and values.min() > stiffness.least - 1e-12
         assert np.linalg.eigvalsh(matrix.toarray()).max() < stiffness.greatest
 

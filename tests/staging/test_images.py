@@ -102,11 +102,11 @@ def test_an_effect_mask_keeps_forces_to_its_white(folder, capsys):
 @pytest.mark.parametrize(
     ("options", "notes"),
     [
-        (("--viscosity-image", "black.png"), ["black all over", "0 everywhere: an inviscid fluid"]),
-        (("--viscosity-image", "white.png", "--invert-viscosity"), ["white all over", "inviscid"]),
-        (("--freeze", "black.png"), ["black.png: black all over, so nothing is frozen"]),
+        (("--viscosity-image", "black.png"), ["black everywhere", "viscosity is 0 everywhere"]),
+        (("--viscosity-image", "white.png", "--invert-viscosity"), ["white everywhere", "viscosity is 0"]),
+        (("--freeze", "black.png"), ["black.png: black everywhere, so nothing is frozen"]),
         (("--freeze", "square.png"), ["square.png: 40 x 40 pixels stretched over the picture's 60 x 40"]),
-        (("--force-image", "self"), ["pressure balances a gradient wholly", "along=contour", "mask"]),
+        (("--force-image", "self"), ["pressure cancels the force of a gradient", "along=contour", "mask"]),
         (("--force-image", "self:along=contour"), []),
         (("--force-image", "self", "--effect-mask", "right.png"), []),
     ],
@@ -155,7 +155,7 @@ def test_the_preview_tints_what_is_stiff_and_frozen(folder, capsys):
         (("--freeze", "black.png:1e9"), "1000000000.0: expected a number from 0"),
         (("--freeze", "none.png:100"), "none.png: no such picture"),
         (("--freeze", "nan.exr"), "nan.exr: 1 values are not finite"),
-        (("--effect-mask", "black.png"), "black.png: black all over, so no force would act"),
+        (("--effect-mask", "black.png"), "black.png: black everywhere, so no force acts"),
         (("--force-image", "none.png"), "none.png: no such picture"),
         (("--force-image", "black.png"), "black.png: ImageForce: the picture is the same everywhere"),
         (("--force-image", "self:along=swirl"), "along: 'swirl': expected one of gradient, contour, vectors"),
@@ -165,7 +165,7 @@ def test_the_preview_tints_what_is_stiff_and_frozen(folder, capsys):
         (("--force-image", "self:along=contour,amount=1e9"), "expected at most 10000"),
         (("--force-image", "self:radius=-1"), "radius: -1.0: expected a number from 0"),
         (("--force-image", "black.png:along=vectors"), "needs two channels"),
-        (("-o", "x.####.png", "--freeze", "x.1005.png"), "that is a picture that is read"),
+        (("-o", "x.####.png", "--freeze", "x.1005.png"), "is an input of the scene"),
     ],
 )
 def test_mistakes_are_one_line_with_the_remedy_and_nothing_is_written(folder, capsys, options, says):

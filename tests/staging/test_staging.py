@@ -75,20 +75,20 @@ def test_what_is_smaller_than_a_cell_is_noted(folder):
         ({"force": [{"kind": "grow", "center": [3, 3], "factor": 2, "at": 0.1}]}, "force.0.at: no such key"),
         (
             {"force": [{"kind": "stroke", "path": [[0, 1, 1], [1, 9, 9]], "end": 1}]},
-            "goes without start and end",
+            "leave out start and end",
         ),
         (
             {"force": [{"kind": "stroke", "path": [[5, 1, 1], [6, 9, 9]]}]},
             "begins at 5 s, after the animation",
         ),
-        ({"density": [{"name": "ink", "amount": 2}]}, "amount is that of an image"),
+        ({"density": [{"name": "ink", "amount": 2}]}, "amount belongs to an image"),
         ({"density": [{"name": "ink", "source": [{"amount": 1e39}]}]}, "amount: 1e\\+39"),
         ({"density": [{"name": "ink", "source": [{"period": 1}]}]}, "period: no such key"),
         (
             {"viscosity": {"key": [{"time": 1, "value": 1}, {"time": 1, "value": 2}]}},
             "two keys have one time",
         ),
-        ({"output": [{"file": "o.csv", "of": "tracks"}]}, "no point is followed"),
+        ({"output": [{"file": "o.csv", "of": "tracks"}]}, "no points to follow"),
         ({"layer": [{"name": "a\nb", "file": "p.png"}]}, "expected a text on one line"),
         ({"time": {"duration": 1e9}}, "time: .* frames: expected 1"),
     ],
@@ -101,9 +101,9 @@ def test_what_does_not_fit_is_refused_with_its_key(folder, tables, says):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("-o", "o.gif", "--report", "s.toml"), "that is the scene itself"),
+        (("-o", "o.gif", "--report", "s.toml"), "is the scene itself"),
         (("-o", "o.gif", "--report", "r.gif"), "a report is written as .json"),
-        (("-o", "o.gif", "--preview", "s.toml"), "that is the scene itself"),
+        (("-o", "o.gif", "--preview", "s.toml"), "is the scene itself"),
     ],
 )
 def test_a_scene_is_not_written_over(folder, capsys, options, says):

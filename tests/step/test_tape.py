@@ -57,9 +57,9 @@ class Recorded:
         self.fluid = Fluid(densities=[INK], **fluid)
         self.step = Step(GRID, self.fluid, device)
         self.step.allow_gradients()
-        self.step.plan(DT, DT, self.step.follow_medium)
+        self.step.plan(DT, DT, self.step.update_coefficients)
         self.forcing = Forcing(forces, self.fluid, GRID, device, gradients=True)
-        self.forcing.set(forces, self.fluid, 0.0, DT, DT, kept=0.7)
+        self.forcing.set(forces, self.fluid, 0.0, DT, DT, pressure_part=0.7)
         self.before, self.after, bar, after_bar = (
             State.at_rest(GRID, device, 1, len(points)) for _ in range(4)
         )
@@ -73,7 +73,7 @@ class Recorded:
         self.start = [u, v, waves[2], waves[0] * waves[1], 0.01 * waves[0], 8.0 + 0.7 * i + 0.4 * j]
         self.start += [np.array(column) for column in zip(*points, strict=True)]
         self.names = ["u", "v", "d_x", "d_y", "q", "rho", "p_x", "p_y"]
-        if not self.step.medium:  # the pressure is not used
+        if not self.step.coefficients:  # the pressure is not used
             self.start[4] = np.zeros_like(u)
 
     def arrays(self, state):
@@ -104,7 +104,7 @@ class Recorded:
         for f in self.arrays(self.after):
             values = random.standard_normal(self.start[0].shape if f.size > 100 else f.size)
             self._put(values, f.grad)
-        if not self.step.medium:
+        if not self.step.coefficients:
             self.after.q.grad.zero_()
         self.asked = [wp.clone(f.grad) for f in self.arrays(self.after)]
 
@@ -131,7 +131,7 @@ class Recorded:
         gradients = [wp.clone(f.grad) for f in self.arrays(self.before)]
         errors = {}
         for n, name in enumerate(self.names):
-            if name == "q" and not self.step.medium:
+            if name == "q" and not self.step.coefficients:
                 continue
             e = np.random.default_rng(n).standard_normal(self.start[n].shape)
             ends = []
@@ -209,12 +209,12 @@ def test_what_transposes_read_is_found_again_from_the_state(device, name):
     tape, step = recorded.record(), recorded.step
     tape.backward()
     expected = recorded.gradients()
-    between = [*step.feet.foot, *step.pushed, *step.advection.carried, *step.projection.pressed]
+    between = [*step.feet.foot, *step.pushed, *step.advection.carried, *step.projection.without_pressure]
     between += [step.projection.q, *step.diffusion.out]
     for f in between:
         f.fill_(np.nan)
     if recorded.fluid.viscosity_moves:
-        step.medium.levels[0].mu.fill_(7.0)  # finite: what lies beyond its ghosts has weight 0
+        step.coefficients.levels[0].mu.fill_(7.0)  # finite: what lies beyond its ghosts has weight 0
     recorded.ask()
     step.recompute(recorded.before, recorded.forcing)
     tape.backward()
@@ -235,13 +235,13 @@ def test_without_a_tape_nothing_is_recorded_or_allocated(device, monkeypatch):
         return launch(*arguments, **settings)
 
     step, acting = Step(GRID, fluid, device), Forcing(forces, fluid, GRID, device)
-    step.plan(DT, DT, step.follow_medium)
+    step.plan(DT, DT, step.update_coefficients)
     acting.set(forces, fluid, 0.0, DT, DT)
     monkeypatch.setattr(wp, "launch", counted)
     monkeypatch.setattr(wp.Tape, "record_func", lambda *_: pytest.fail("something was recorded"))
     counts.append(0)
     step.advance(*states, acting)
-    between = [*step.feet.foot, *step.pushed, *step.advection.carried, *step.projection.pressed]
+    between = [*step.feet.foot, *step.pushed, *step.advection.carried, *step.projection.without_pressure]
     assert all(f.grad is None for f in (*states[0].arrays, *states[1].arrays, *between))
     monkeypatch.undo()
     monkeypatch.setattr(wp, "launch", counted)
@@ -258,7 +258,7 @@ def test_another_thread_records_nothing_on_the_tape_of_this_one(device):
     """Two threads may each have a solver, and one of them a tape."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
     step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
-    step.plan(DT, DT, step.follow_medium)
+    step.plan(DT, DT, step.update_coefficients)
     with recording() as tape, ThreadPoolExecutor(1) as other:
         other.submit(step.advance, *states, acting).result()
     assert not tape.launches
@@ -268,7 +268,7 @@ def test_a_stage_on_a_tape_without_gradients_is_refused(device):
     """A tape around a step whose arrays have no gradients would be silently wrong."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
     step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
-    step.plan(DT, DT, step.follow_medium)
+    step.plan(DT, DT, step.update_coefficients)
     with pytest.raises(RuntimeError, match="missing a gradient"), recording():
         step.advance(*states, acting)
 

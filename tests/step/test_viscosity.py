@@ -209,7 +209,7 @@ def test_a_viscosity_that_moves_goes_with_the_picture(make_solver):
             solver.step(a, b, [], 0.0, 2 / 32)
             a, b = b, a
         solver.step(a, b, [], 0.0, 2 / 32)
-        got = to_numpy(solver._step.medium.levels[0].mu, solver.layout)
+        got = to_numpy(solver._step.coefficients.levels[0].mu, solver.layout)
         expected = np.roll(mu, (-5, 10), (0, 1)) if moves else mu
         np.testing.assert_allclose(got, expected, atol=2e-5 * 0.01 + 1e-7)
 
@@ -222,7 +222,7 @@ def test_a_viscosity_of_the_time_is_followed(make_solver):
         a, b = solver.rest(), solver.rest()
         for t, expected in ((0.0, 0.02575), (0.25, 0.0505), (0.75, 0.1), (2.0, 0.1)):
             solver.step(a, b, [], t, 0.25)
-            got = to_numpy(solver._step.medium.levels[0].mu, solver.layout)
+            got = to_numpy(solver._step.coefficients.levels[0].mu, solver.layout)
             np.testing.assert_allclose(got, expected, rtol=1e-6)
 
 
@@ -231,7 +231,7 @@ def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_s
 
     But for the pressure kept from step to step, which only a still one may keep.
     """
-    monkeypatch.setattr(Step, "kept", lambda self, *last: 0.0)
+    monkeypatch.setattr(Step, "pressure_part", lambda self, *last: 0.0)
     mu = np.random.default_rng(1).random((24, 32)) * 0.05
     force = GaussianForce((0.5, 0.4), (1.0, 0.5), 0.1)
     ends = []

@@ -1,4 +1,4 @@
-"""The command line for tests: in this process, or in one of its own."""
+"""The command line for tests, in this process or in a separate one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wfluid.cli.main import main
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended; the names are those of `subprocess.CompletedProcess`."""
+    """The result of a command, with the names of `subprocess.CompletedProcess`."""
 
     returncode: int
     stdout: str
@@ -22,7 +22,7 @@ class Ended:
 
 
 def wfluid(*arguments) -> Ended:
-    """Run a command line in this process, which takes no second to start; an exception is the test's."""
+    """Run a command line in this process, without start-up time; exceptions reach the test."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
         try:
@@ -33,6 +33,6 @@ def wfluid(*arguments) -> Ended:
 
 
 def wfluid_process(*arguments, **settings) -> subprocess.CompletedProcess[str]:
-    """Run a command line as people do: with exit code, tracebacks and what libraries write of their own."""
+    """Run a command line in a separate process, with exit code, tracebacks and output of libraries."""
     command = [sys.executable, "-m", "wfluid", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, **settings)

@@ -1,4 +1,4 @@
-"""Small runs that the tests of gradients share: fluids, forces, objectives and what of them may vary."""
+"""Small runs shared by the tests of gradients: fluids, forces, objectives and free parameters."""
 
 from __future__ import annotations
 
@@ -41,23 +41,23 @@ from wfluid.gradient.state_objectives import DensityMisfit, MapMisfit, WarpObjec
 from wfluid.gradient.variables import Free
 
 GRID = Grid(23, 18, 1.0, 0.7)
-"""Another number of cells along y, of another height."""
+"""A grid with different numbers and sizes of cells along x and y."""
 
 TIMELINE = Timeline(5 / 24, fps=24, substeps=2)
 """Ten steps of 1/48 s."""
 
 END, MIDDLE = 10 / 48, 6 / 48
-"""When objectives look at the run [s]."""
+"""Times of objectives [s]."""
 
 EXACT = {"diffusion_tolerance": 1e-13, "pressure_tolerance": 1e-13}
-"""Conjugate gradients go on until rounding stops them: no value jumps where they would take one more."""
+"""Conjugate gradients iterate up to rounding, so that no value jumps when their number changes."""
 
 SURE = {"diffusion_tolerance": 1e-9}
-"""Cycles are as many whatever they solve for; only a free viscosity asks how far they go."""
+"""The number of cycles is fixed; only a free viscosity needs a tolerance."""
 
 
 def paint(low, high, seed):
-    """Smooth hills over the picture, (ny, nx), between two values."""
+    """A smooth field over the picture, (ny, nx), between two values."""
     rng = np.random.default_rng(seed)
     x, y = centres(GRID)
     hills = sum(np.sin(a * x + b * y + c) for a, b, c in rng.uniform(2, 7, (4, 3)))
@@ -93,7 +93,7 @@ PARTICLES = ParticleMisfit(POINTS, WANTED, END, weights=np.linspace(0.5, 2, 7))
 
 
 def wave(t, places):
-    """A function of places and the time, with its gradient."""
+    """An objective of positions and time, with its gradient."""
     x, y = places.T
     slope = np.stack([4 * np.cos(4 * x) * np.exp(y) + t, np.sin(4 * x) * np.exp(y)], axis=1)
     return float(np.sum(np.sin(4 * x) * np.exp(y) + t * x)), slope
@@ -105,19 +105,19 @@ EARLY_MAP = MapMisfit(np.zeros((2, 18, 23)), MIDDLE)
 
 
 def far_apart(state, value):
-    """Of the particles, in Warp."""
+    """An objective of the particles, in Warp."""
     wp.launch(mean_square, len(state.p_x), [state.p_x, state.p_y, value], device=value.device)
 
 
 def lively(state, value):
-    """Of the velocity, at every cell, in Warp."""
+    """An objective of the velocity at every cell, in Warp."""
     grid, layout = state.grid, state.layout
     inputs = [state.u, state.v, grid.nx, layout.first, layout.pitch, 1 / (grid.nx * grid.ny), value]
     wp.launch(product, grid.nx * grid.ny, inputs, device=value.device)
 
 
 def carried(state, value):
-    """Of a density and the displacement, at every cell, in Warp."""
+    """An objective of a density and the displacement at every cell, in Warp."""
     grid, layout = state.grid, state.layout
     inputs = [state.rho[0], state.d_y, grid.nx, layout.first, layout.pitch, 1 / (grid.nx * grid.ny), value]
     wp.launch(product, grid.nx * grid.ny, inputs, device=value.device)
@@ -146,7 +146,7 @@ SMOKE_MISFIT = DensityMisfit("smoke", paint(0, 2, 12), MIDDLE)
 
 @dataclass(frozen=True)
 class Case:
-    """A run, what is asked of it, and what may vary."""
+    """A run with its objective and its free parameters."""
 
     forces: Sequence
     objective: Objective
@@ -154,15 +154,15 @@ class Case:
     fluid: dict = field(default_factory=dict)
     velocity: np.ndarray | None = None
     capped: bool = False
-    """Whether it has the least memory that it can do with."""
+    """Whether the run gets only the least memory that it needs."""
 
     @property
     def names(self):
-        """Of what may vary."""
+        """Names of the free parameters."""
         return [one if isinstance(one, str) else one.name for one in self.free]
 
     def functional(self, device, memory_mb=None, timeline=TIMELINE):
-        """It as a functional."""
+        """The functional of the case."""
         if self.capped and memory_mb is None:
             memory_mb = self.least_memory(device, timeline)
         free = [Free(one) if isinstance(one, str) else one for one in self.free]
@@ -171,19 +171,18 @@ class Case:
         return Functional(*run, self.objective, free, **settings)
 
     def least_memory(self, device, timeline=TIMELINE):
-        """The memory [MB] that a refusal names as the least."""
+        """The least memory [MB], from the message of an error."""
         with pytest.raises(ValueError, match="need at least") as refused:
             self.functional(device, 1e-3, timeline)
         return float(str(refused.value).rpartition(" ")[2])
 
 
 def cells_of_traces(functional):
-    """The cells that the bilinear look-ups of the last run fell into, step by step.
+    """The cells used by the bilinear look-ups of the last run, step by step.
 
-    Found from velocities and displacements alone, apart from the code under test: of every cell that of its
-    foot (the paper's scheme) or of the middle of its trace, as seen from centres and from faces, and
-    whether a wall stopped it; with a viscosity that moves, where it came from. Only where every state is
-    kept.
+    Computed from velocities and displacements, independently of the code under test. For every centre and
+    face it is the cell at the end of the backtrace (the paper's scheme) or at its middle, and whether a wall
+    stopped the backtrace; with a moving viscosity also the source. The recording must keep every state.
     """
     recording = functional._recording
     assert recording.schedule.keeps_all
@@ -191,7 +190,7 @@ def cells_of_traces(functional):
     lines = layout.size // layout.pitch
     u, v, d_x, d_y = (
         table.rows(0, steps)[:, : lines * layout.pitch].reshape(steps, lines, layout.pitch)
-        for table in recording._states[:4]
+        for table in recording.loops.states[:4]
     )
     inner = slice(HALO, HALO + layout.ny), slice(HALO, HALO + layout.nx)
     paper, found = fluid.scheme == "paper", []
@@ -214,7 +213,7 @@ def cells_of_traces(functional):
 
 
 def hard_edge():
-    """A disc that stays, at once."""
+    """A freeze mask of a disc with a sharp edge."""
     return Freeze(disc(GRID, 0.7, 0.5, 0.16).astype(float))
 
 

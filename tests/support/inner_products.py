@@ -1,4 +1,4 @@
-"""Inner products of fields, and what the tests of transposes share: <y, A x> = <A^T y, x>."""
+"""Inner products of fields for the tests of transposes: <y, A x> = <A^T y, x>."""
 
 import numpy as np
 from wfluid.kernels.cell.layout import HALO
@@ -15,15 +15,15 @@ def padded(f, layout):
 
 def put_padded(values, f, layout):
     """Write values with ghosts, (ny + 4, nx + 4), into a field."""
-    whole = f.numpy().copy()
+    buffer = f.numpy().copy()
     rows = layout.size // layout.pitch
-    grid = whole[: rows * layout.pitch].reshape(rows, layout.pitch)
+    grid = buffer[: rows * layout.pitch].reshape(rows, layout.pitch)
     grid[: layout.ny + 2 * HALO, : layout.nx + 2 * HALO] = values
-    f.assign(whole)
+    f.assign(buffer)
 
 
 def noise(layout, device, components, seed, *ghosts):
-    """Fields of noise; with `ghosts` for each, these filled and what lies on a wall 0."""
+    """Fields of noise; with `ghosts` for each field, ghosts are filled and values on walls are 0."""
     rng = np.random.default_rng(seed)
     fields = vector(layout, device, components)
     for f in fields:

@@ -1,4 +1,4 @@
-"""Scenes that keyframes are tested with: points, where they should be, and what they move in."""
+"""Cases of keyframe tests: points, destinations and fluids."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from wfluid.keyframes.match import Match, match_keyframes
 from wfluid.pictures.picture import Picture
 
 SIDE = 512
-"""Longer side of the pictures [px]: residuals are told in it."""
+"""Longer side of the pictures [px], in which residuals are given."""
 
 FPS, SUBSTEPS = 24, 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """Arrows of one length of time, or keyframes of their own times, in a fluid."""
+    """Arrows of one duration, or keyframes with times, in a fluid."""
 
     arrows: Sequence[tuple] = ()
-    """Point and destination, both due at the end."""
+    """Points and their destinations at the end."""
     paths: Sequence[tuple] = ()
-    """Point and its destinations by time."""
+    """Points and their destinations by time."""
     pins: Sequence[tuple] = ()
     fluid: dict = field(default_factory=dict)
     forces: Sequence[GaussianForce] = ()
@@ -39,7 +39,7 @@ class Case:
     height: int = SIDE
 
     def animation(self, device):
-        """What moves, without the forces sought."""
+        """The animation without the forces to be found."""
         picture = Picture(np.zeros((self.height, SIDE, 3), np.float32))
         fluid = Fluid(**{"viscosity": 0.005, **self.fluid})
         timeline = Timeline(self.duration, self.fps, SUBSTEPS)
@@ -47,21 +47,21 @@ class Case:
 
     @property
     def keyframes(self):
-        """All of them, without pins."""
+        """All keyframes, without pins."""
         found = [ParticleKeyframe(point, to, self.duration) for point, to in self.arrows]
         for point, stops in self.paths:
             found += [ParticleKeyframe(point, to, time) for time, to in stops.items()]
         return found
 
     def match(self, device="cpu", **settings) -> Match:
-        """The forces found."""
+        """The result of the search."""
         return match_keyframes(
             self.animation(device), self.keyframes, pins=self.pins, free=self.free, side=SIDE, **settings
         )
 
 
 def scattered(count, spacing, seed, margin=0.1):
-    """Arrows from random points so far apart, no longer than half the way to the next point."""
+    """Arrows from random points with a least distance, no longer than half the distance to the next point."""
     rng = np.random.default_rng(seed)
     points = []
     while len(points) < count:
@@ -84,7 +84,7 @@ def around(place, distance, count=4):
 
 
 def honey(contrast):
-    """A painted disc that is so many times stiffer than the rest."""
+    """A painted disc of higher viscosity."""
     return np.where(disc(Grid(128, 128), 0.45, 0.5, 0.12), 0.002 * contrast, 0.002)
 
 

@@ -1,4 +1,4 @@
-"""Pictures that are known at any time between two of them, and their morphs, each searched for once."""
+"""Pairs of pictures with known pictures in between, and their morphs, each searched for once."""
 
 from dataclasses import replace
 from functools import cache
@@ -11,13 +11,13 @@ SIDE, HEIGHT = 240, 160
 """Pixels of the pictures with dots."""
 
 POINTS = (((0.3, 0.25), (0.38, 0.3)), ((0.7, 0.3), (0.64, 0.24)), ((0.5, 0.45), (0.5, 0.52)))
-"""Points of the one that correspond to those of the other."""
+"""Corresponding points of both pictures."""
 
 SHIFT = (8, -6)
 """Pixels by which the periodic picture of 64 x 48 is shifted."""
 
 ANGLE = np.radians(20)
-"""By which the round picture of 128 x 128 is turned."""
+"""Angle by which the round picture of 128 x 128 is turned."""
 
 
 def dots(points, spread=2.0, width=SIDE, height=HEIGHT):
@@ -29,7 +29,7 @@ def dots(points, spread=2.0, width=SIDE, height=HEIGHT):
 
 
 def centroid(picture, near, reach=12):
-    """Where the light around a place is [px], by its first moments."""
+    """Centroid of the light around a place [px]."""
     values = picture.pixels[..., 0].astype(np.float64)
     x, y = np.arange(values.shape[1]) + 0.5, (np.arange(values.shape[0]) + 0.5)[:, None]
     side = max(values.shape)
@@ -67,7 +67,7 @@ def rotated(point, angle):
 
 
 RING = [(0.5 + 0.16 * np.cos(a), 0.5 + 0.16 * np.sin(a)) for a in np.pi / 2 * np.arange(4) + 0.3]
-"""Points that are turned."""
+"""Points of the turned picture."""
 
 LINEAR = {"warp_curve": "linear", "blend_curve": "linear"}
 
@@ -99,7 +99,7 @@ def searched(name, device):
 
 
 def going(found, **changes):
-    """A morph on the same flow that goes another way."""
+    """A morph on the same flow with other settings."""
     return replace(found, settings=replace(found.settings, **changes))
 
 
@@ -110,5 +110,5 @@ def of_pictures(found, a, b):
 
 
 def psnr(got, wanted):
-    """Of pixels 0 … 1 [dB]."""
+    """Peak signal-to-noise ratio of pixels 0 … 1 [dB]."""
     return -10 * np.log10(np.mean((np.asarray(got, np.float64) - wanted) ** 2) + 1e-30)

@@ -1,10 +1,10 @@
-"""What tests compare with, written apart from the code under test."""
+"""Reference solutions for tests, independent of the code under test."""
 
 import numpy as np
 
 
 def from_streamfunction(grid, psi):
-    """Face velocities (psi at nodes, differenced): free of divergence to rounding."""
+    """Face velocities by differences of psi at nodes, free of divergence up to rounding."""
     x = np.arange(grid.nx + 1) * grid.hx
     y = np.arange(grid.ny + 1)[:, None] * grid.hy
     values = psi(x, y)
@@ -12,7 +12,7 @@ def from_streamfunction(grid, psi):
 
 
 def noise_velocity(solver, seed=0):
-    """Random face velocities that respect the solver's walls."""
+    """Random face velocities that meet the solver's boundary conditions."""
     rng = np.random.default_rng(seed)
     nx, ny = solver.grid.nx, solver.grid.ny
     u, v = rng.standard_normal((ny, nx + 1)), rng.standard_normal((ny + 1, nx))
@@ -27,7 +27,7 @@ def noise_velocity(solver, seed=0):
 
 
 def divergence(grid, u, v):
-    """At centres, from face velocities."""
+    """Divergence at centres, from face velocities."""
     return np.diff(u, axis=1) / grid.hx + np.diff(v, axis=0) / grid.hy
 
 
@@ -40,7 +40,7 @@ def strain_rate(grid, u, v):
 
 
 def sparse_laplacian(n, h, kind):
-    """One axis's second difference, assembled apart from the code under test.
+    """The second difference along one axis, independent of the code under test.
 
     "even", "odd": points half a cell inside; "face": the n - 1 inner faces; "periodic".
     """
@@ -62,7 +62,7 @@ def sparse_laplacian(n, h, kind):
 
 
 def laplacian_2d(grid, kind_x, kind_y):
-    """Laplacian over unknowns row by row, from two axes."""
+    """The Laplacian over unknowns, row by row, from the second differences of two axes."""
     import scipy.sparse as sparse
 
     x, y = sparse_laplacian(grid.nx, grid.hx, kind_x), sparse_laplacian(grid.ny, grid.hy, kind_y)

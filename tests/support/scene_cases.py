@@ -1,4 +1,4 @@
-"""What each key of a scene does: a value for it, and what is then seen of the animation.
+"""The effect of each key of a scene: a value, and the attribute of the animation that it determines.
 
 The expected numbers are worked out here, apart from the code under test.
 """
@@ -18,23 +18,23 @@ SIDE = 60
 """Longer side of the pictures [px]."""
 
 SECONDS = 2.0
-"""Length of the scenes."""
+"""Duration of the scenes."""
 
 QUARTERS = np.arange(0, SECONDS, 0.25)
-"""Courses are looked at by quarters of a second."""
+"""Envelopes are sampled by quarters of a second."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A value for a key, and what is then seen."""
+    """A value of a key, and its expected effect."""
 
     value: Any
     look: Callable[[Animation], Any]
     seen: Any
     table: Mapping[str, Any] | None = None
-    """The other keys of its table, if not those of `USUAL`."""
+    """The other keys of the table, if not those of `USUAL`."""
     without: Mapping[str, Any] | None = None
-    """The table without the key, if it is not the same."""
+    """The table without the key, if different."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further tables of the scene."""
 
@@ -43,7 +43,7 @@ class Case:
 
 
 def get(path):
-    """At an attribute of an attribute, or an item."""
+    """A getter of a nested attribute or item."""
 
     def look(animation):
         found = animation
@@ -71,12 +71,12 @@ def of_layer(name):
 
 
 def groups(animation):
-    """The groups' names, each with how many forces it has."""
+    """The names of groups, each with its number of forces."""
     return [(group.name, len(group.members)) for group in animation.forces if isinstance(group, Group)]
 
 
 def work(animation):
-    """What the force gives in each quarter of a second: push, turn, swelling; or a field's strength."""
+    """The impulse in each quarter of a second: push, turn, swell; or the strength of a field."""
     force = force_of(animation)
     if isinstance(force, LocalForce):
         blobs = [force.impulse(t, t + 0.25) for t in QUARTERS]
@@ -86,7 +86,7 @@ def work(animation):
 
 
 def places(animation):
-    """Where the force is as time goes."""
+    """Positions of the force over time."""
     return [place_at(force_of(animation).center, t) for t in QUARTERS]
 
 
@@ -95,35 +95,35 @@ def places_of_source(animation):
 
 
 def poured(animation):
-    """Density that the source pours in each quarter of a second."""
+    """Density that the source adds in each quarter of a second."""
     return [source_of(animation).impulse(t, t + 0.25).amount for t in QUARTERS]
 
 
 def sides(values):
-    """What is painted left and right."""
+    """Painted values on the left and right."""
     return values[20, 10], values[20, 50]
 
 
 def weights(animation):
-    """How much of the force acts left and right."""
+    """Weights of the force on the left and right."""
     weight = force_of(animation).weight
     return (1, 1) if weight is None else sides(weight.values)
 
 
 def painted_source(animation):
-    """What the source pours left and right, of one that is painted."""
+    """Rates of a painted source on the left and right."""
     paint = getattr(source_of(animation), "paint", None)
     return None if paint is None else sides(paint.values)
 
 
 def painted_density(animation):
-    """What is there left and right at the beginning."""
+    """Initial densities on the left and right."""
     initial = animation.fluid.densities[0].initial
     return None if initial is None else sides(initial.values)
 
 
 def viscosity_at(t):
-    """The viscosity of both sides at a time [s]."""
+    """The viscosity on the left and right at a time [s]."""
 
     def look(animation):
         found = animation.fluid.viscosity
@@ -140,7 +140,7 @@ def size(animation):
 # Courses in time: what is given in each quarter of a second
 
 
-def course(f):
+def integrals_of(f):
     """Integrals of a function of the time, by midpoints."""
     middles = (np.arange(4000) + 0.5) / 4000 * 0.25
     return np.array([float(np.mean(f(t + middles))) / 4 for t in QUARTERS])
@@ -152,34 +152,34 @@ def smooth(s):
     return s * s * (3 - 2 * s)
 
 
-STEADY, FIRST_HALF = course(np.ones_like), course(lambda t: t < 1)
+STEADY, FIRST_HALF = integrals_of(np.ones_like), integrals_of(lambda t: t < 1)
 WAVE = 2 * np.pi / 0.7
-"""Of a period of 0.7 s."""
+"""Envelopes with a period of 0.7 s."""
 
-COURSES = {
-    "start": (0.5, {}, course(lambda t: t > 0.5), 2 / 1.5**2),
-    "end": (1.25, {}, course(lambda t: t < 1.25), 2 / 1.25**2),
+TIMINGS = {
+    "start": (0.5, {}, integrals_of(lambda t: t > 0.5), 2 / 1.5**2),
+    "end": (1.25, {}, integrals_of(lambda t: t < 1.25), 2 / 1.25**2),
     "at": (0.5, {}, (QUARTERS == 0.5) * 1.0, 1 / 1.5),
-    "period": (0.7, {}, course(lambda t: np.cos(WAVE * t) * np.where(t < 0.35, 0.5, 1)), WAVE**2),
-    "phase": (0.1, {"period": 0.7}, course(lambda t: np.sin(WAVE * t + 0.2 * np.pi)), WAVE**2),
-    "rise": (0.5, {}, course(lambda t: smooth(t / 0.5)), 0.5),
-    "fall": (0.5, {}, course(lambda t: smooth((2 - t) / 0.5)), 0.5),
+    "period": (0.7, {}, integrals_of(lambda t: np.cos(WAVE * t) * np.where(t < 0.35, 0.5, 1)), WAVE**2),
+    "phase": (0.1, {"period": 0.7}, integrals_of(lambda t: np.sin(WAVE * t + 0.2 * np.pi)), WAVE**2),
+    "rise": (0.5, {}, integrals_of(lambda t: smooth(t / 0.5)), 0.5),
+    "fall": (0.5, {}, integrals_of(lambda t: smooth((2 - t) / 0.5)), 0.5),
     "strength": (-3.0, {}, -3 * STEADY, 0.5),
     "envelope": ("half", {}, FIRST_HALF, 0.5),
 }
-"""By key: a value, what it needs, its course, and the acceleration that carries a free particle by one."""
+"""By key: a value, further keys, the envelope, and the acceleration that moves a free particle by 1."""
 
 HALF = {"envelopes": {"half": {"kind": "constant", "end": 1}}}
-"""The envelope that is spoken of."""
+"""The named envelope of the scene."""
 
 
 def growing(key, given):
-    """A growth is a rate: over its course it comes to the growth, but for what multiplies it."""
+    """A growth is a rate whose integral over the envelope is the growth, times further factors."""
     if key in ("strength", "envelope"):
         return given / STEADY.sum()
     if key in ("period", "phase"):
         ahead = 0.25 if key == "period" else 0.1
-        return WAVE * course(lambda t: np.sin(WAVE * t + 2 * np.pi * ahead))
+        return WAVE * integrals_of(lambda t: np.sin(WAVE * t + 2 * np.pi * ahead))
     return given / given.sum()
 
 
@@ -187,12 +187,12 @@ def growing(key, given):
 
 
 def push(x, y):
-    """Of an arrow [px]: the pressure takes half."""
+    """Acceleration of an arrow [px]; the pressure halves it."""
     return [2 * x / SIDE, 2 * y / SIDE, 0, 0]
 
 
 def drag(length, seconds, radius):
-    """Of a stroke to the right [px]: |V| V / (radius sqrt(2 pi))."""
+    """Acceleration of a stroke to the right [px]: |V| V / (radius sqrt(2 pi))."""
     speed = length / SIDE / seconds
     return np.array([speed**2 / (radius / SIDE * math.sqrt(2 * math.pi)), 0, 0, 0])
 
@@ -212,7 +212,7 @@ FORCES = {
     "image": ({"kind": "image", "file": "small.png", "amount": 3}, [3 / SIDE]),
     "buoyancy": ({"kind": "buoyancy", "density": "ink", "by": [0, -20]}, [0, -20 / SIDE]),
 }
-"""By kind: a table, and what it gives a free particle by its course."""
+"""By kind: a table, and its effect on a free particle by its envelope."""
 
 
 def less(table, *names):
@@ -221,7 +221,7 @@ def less(table, *names):
 
 def _forces():
     for kind, (table, given) in FORCES.items():
-        for key, (value, needs, in_time, per_length) in COURSES.items():
+        for key, (value, needs, in_time, per_length) in TIMINGS.items():
             if (kind, key) == ("grow", "at"):
                 continue
             in_time = growing(key, in_time) if kind == "grow" else per_length * in_time
@@ -256,20 +256,20 @@ def _forces():
 
 
 def _strokes():
-    """A brush that goes 30 px in its window."""
-    whole, late = drag(30, 2, 6), course(lambda t: t > 0.5)
+    """A brush that moves by 30 px in its window."""
+    total, late = drag(30, 2, 6), integrals_of(lambda t: t > 0.5)
     path = [[0, 10, 20], [1, 40, 20]]
     yield "points", Case([[10, 20], [30, 20]], work, np.outer(STEADY, drag(20, 2, 6)))
     yield "path", Case(path, work, np.outer(FIRST_HALF, drag(30, 1, 6)), less(STROKE, "points"), STROKE)
     yield "radius", Case(12, work, np.outer(STEADY, drag(30, 2, 12)))
     yield "start", Case(0.5, work, np.outer(late, drag(30, 1.5, 6)))
     yield "end", Case(1, work, np.outer(FIRST_HALF, drag(30, 1, 6)))
-    yield "strength", Case(-3, work, np.outer(-3 * STEADY, whole))
-    yield "envelope", Case("half", work, np.outer(FIRST_HALF, whole), more=HALF)
+    yield "strength", Case(-3, work, np.outer(-3 * STEADY, total))
+    yield "envelope", Case("half", work, np.outer(FIRST_HALF, total), more=HALF)
 
 
 def _envelopes():
-    """What an envelope is, seen through a push."""
+    """The values of an envelope, measured by a push."""
     wave = {"kind": "oscillator", "period": 1}
     ramp = {"kind": "samples", "times": [0, 2], "values": [1, 0]}
     turn = 2 * np.pi
@@ -287,16 +287,16 @@ def _envelopes():
         (ramp, "times", [0, 1], lambda t: np.maximum(1 - t, 0)),
         (ramp, "values", [3, -1], lambda t: 3 - 2 * t),
     ):
-        yield table["kind"], key, Case(value, work, np.outer(course(f) / 2, push(6, 3)), table)
+        yield table["kind"], key, Case(value, work, np.outer(integrals_of(f) / 2, push(6, 3)), table)
 
 
 def _sources():
-    """A source pours its amount over its window, times its strength and further envelopes."""
-    for key, (value, needs, in_time, _) in COURSES.items():
+    """A source adds its amount over its window, times its strength and further envelopes."""
+    for key, (value, needs, in_time, _) in TIMINGS.items():
         if key in ("period", "phase"):
             continue
-        whole = STEADY.sum() if key in ("strength", "envelope") else abs(in_time.sum())
-        yield key, Case(value, poured, in_time / whole, {**SPOT, **needs}, more=HALF)
+        total = STEADY.sum() if key in ("strength", "envelope") else abs(in_time.sum())
+        yield key, Case(value, poured, in_time / total, {**SPOT, **needs}, more=HALF)
     yield "center", Case([15, 30], places_of_source, [(0.25, 0.5)] * 8)
     yield "path", Case(PATH, places_of_source, ALONG_PATH, {}, SPOT)
     yield "radius", Case(12, lambda a: source_of(a).radius, 0.2)
@@ -367,7 +367,7 @@ USUAL = {
     "[[density.source]]": SPOT,
     "[[layer]]": {"name": "matte", "file": "right.png"},
 }
-"""By heading: a table without the key that is looked at."""
+"""By heading: a table without the tested key."""
 
 CASES = {
     **{(f'[[force]] kind = "{kind}"', key): case for kind, key, case in _forces()},
@@ -375,11 +375,11 @@ CASES = {
     **{("[[density.source]]", key): case for key, case in _sources()},
     **{(heading, key): case for heading, key, case in _others()},
 }
-"""By heading and key."""
+"""Expected effects by heading and key."""
 
 
 def scene_with(heading, table, more):
-    """The tables of a small scene that has a table under a heading."""
+    """The tables of a small scene with a table under a heading."""
     scene = {
         "wfluid": 1,
         "picture": {"file": "small.png"},

@@ -1,4 +1,4 @@
-"""Scenes for tests: any that the schema allows, and pictures for them to name."""
+"""Random valid scenes for tests, and pictures for their files."""
 
 import datetime
 import math
@@ -26,7 +26,7 @@ WRONG = (
     *(math.nan, math.inf, -1e9, 2.5, 2**33, "", "  ", "no such word", True, datetime.date(1979, 5, 27)),
     *([], {}, [1], [1, "2"], [1, math.nan], [[1, 2, 3, 4]], [True, False], ["a", 1], {"a": 1}, [{}]),
 )
-"""Values that some key refuses; a key's own check says which."""
+"""Values that some key refuses, according to its check."""
 
 KEYS = [
     (heading, name)
@@ -34,16 +34,16 @@ KEYS = [
     for name, key in table.keys.items()
     if isinstance(key, Key)
 ]
-"""Every key of a scene, each with its table's heading."""
+"""All keys of a scene, each with the heading of its table."""
 
 
 def taken(key):
-    """Values that a key takes, as it keeps them."""
+    """Accepted values of a key, as stored."""
     return [key.check(value) for value in (*VALUES, *key.type.split(" or ")) if takes(key, value)]
 
 
 def takes(key, value):
-    """Whether a key takes a value."""
+    """Whether a key accepts a value."""
     try:
         key.check(value)
     except ValueError:
@@ -52,7 +52,7 @@ def takes(key, value):
 
 
 def valid(what):
-    """Any value that a part of the schema allows, as a strategy; names fit together by chance only."""
+    """A strategy of valid values of a part of the schema; names refer to one another by chance only."""
     if isinstance(what, Key):
         found = st.sampled_from(taken(what))
         if what.type == "a text" and not what.file:
@@ -72,7 +72,7 @@ def valid(what):
 
 
 def valid_variant(what, kind):
-    """Any table of one kind."""
+    """A strategy of tables of one kind."""
     return valid(what.tables[kind]).map(lambda table: {"kind": kind, **table})
 
 
@@ -81,7 +81,7 @@ SCENES = valid(SCENE)
 
 @st.composite
 def scenes(draw):
-    """Tables of a valid scene, whose names fit together."""
+    """A strategy of tables of valid scenes, with consistent names."""
     found = draw(SCENES)
     found.setdefault("picture", {"file": "a.png"})
     found = of_morph(found) if "morph" in found else found
@@ -90,7 +90,7 @@ def scenes(draw):
 
 
 def of_morph(scene):
-    """The tables that a morph has a use for, with a point of both pictures."""
+    """The tables that apply to a morph, with a point of both pictures."""
     found = less(scene, "force", "group", "density", "layer", "tracks", "effect")
     keyframes = less(found.get("keyframes", {}), "time")
     moves = keyframes.get("move") or [{"from": [1, 2], "to": [3, 4]}]
@@ -106,7 +106,7 @@ def less(table, *names):
 
 
 def named(scene, choose):
-    """The tables with names that differ, and uses of them that exist."""
+    """The tables with unique names and valid references."""
     if any(force["kind"] == "buoyancy" for force in scene.get("force", [])) and not scene.get("density"):
         scene["density"] = [{"name": "ink"}]
     for kind in ("force", "group", "layer", "density"):
@@ -137,7 +137,7 @@ def named(scene, choose):
 
 
 def full(what=SCENE):
-    """Tables that hold every key there is, one of each kind, each with the first value that it takes."""
+    """Tables with all keys, one table of each kind, each key with its first valid value."""
     if isinstance(what, Key):
         return taken(what)[0]
     if isinstance(what, Table):
@@ -149,7 +149,7 @@ def full(what=SCENE):
 
 
 def parts(what, value, path=()):
-    """Every part of a scene: its path, what the schema has for it, and its value."""
+    """All parts of a scene: path, part of the schema, value."""
     yield path, what, value
     if isinstance(what, ArrayOf | MapOf):
         items = enumerate(value) if isinstance(what, ArrayOf) else value.items()
@@ -162,12 +162,12 @@ def parts(what, value, path=()):
 
 
 def keys_of(what, value):
-    """The keys that a table of a scene may have, but for its kind."""
+    """The possible keys of a table, except its kind."""
     return what.tables[value["kind"]].keys if isinstance(what, Union) else what.keys
 
 
 def changed(value, path, change):
-    """A copy in which `change` is made to a copy of the part at a path."""
+    """A copy in which the part at a path is replaced by a changed copy."""
     if not path:
         copy = dict(value) if isinstance(value, dict) else value
         return change(copy)

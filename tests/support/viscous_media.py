@@ -1,4 +1,4 @@
-"""Media of varying viscosity and drag that the tests of viscosity share, and the diffusion of one."""
+"""Media of varying viscosity and drag for the tests of viscosity, and their diffusion."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from wfluid.step.coefficients import Coefficients
 from wfluid.step.diffusion import CoupledDiffusion
 
 WALLS = ("free-slip", "no-slip", "periodic", "no-slip,periodic", "free-slip,no-slip")
-"""Each kind of wall on all sides, and two kinds mixed."""
+"""Each boundary condition on all sides, and two combinations."""
 
 MEDIA = ("constant", "smooth", "jump 1e2", "jump 1e4", "noise", "drag", "both")
 """The names of `media`."""
@@ -23,12 +23,12 @@ def disc(grid, x=0.5, y=0.5, radius=0.25):
 
 
 def centres(grid):
-    """Where the centres of cells lie: x along a row (nx,), y down a column (ny, 1)."""
+    """Positions of centres: x (nx,) and y (ny, 1)."""
     return (np.arange(grid.nx) + 0.5) * grid.hx, ((np.arange(grid.ny) + 0.5) * grid.hy)[:, None]
 
 
 def media(grid):
-    """Viscosity and drag by name: what the solves must cope with."""
+    """Viscosity and drag by name."""
     x, y = centres(grid)
     rng = np.random.default_rng(5)
     blank = np.zeros((grid.ny, grid.nx))
@@ -49,19 +49,19 @@ def frozen(alpha):
 
 
 def coupled(grid, mu, alpha, walls, device, dt=DT, **settings):
-    """The coupled diffusion of a medium, ready."""
+    """The coupled diffusion with given coefficients, ready to run."""
     fluid = Fluid(viscosity=mu, freeze=frozen(alpha), walls=walls, **settings)
-    medium = Coefficients(grid, fluid, device)
-    diffusion = CoupledDiffusion(fluid, medium, device)
-    medium.set_time(0.0, dt)
+    coefficients = Coefficients(grid, fluid, device)
+    diffusion = CoupledDiffusion(fluid, coefficients, device)
+    coefficients.set_time(0.0, dt)
     diffusion.plan(dt)
-    medium.coarsen()
-    diffusion.prepare()
+    coefficients.coarsen()
+    diffusion.update_coefficients()
     return diffusion
 
 
 def random_vector(diffusion, seed):
-    """A vector of noise, zero on walls."""
+    """A vector of noise, 0 on walls."""
     layout, rng = diffusion.layout, np.random.default_rng(seed)
     out = vector(layout, diffusion.device, 2)
     for f in out:

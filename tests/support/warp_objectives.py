@@ -1,4 +1,4 @@
-"""Kernels of one's own for objectives: Warp finds their gradients."""
+"""Kernels of user objectives, differentiated by Warp."""
 
 import warp as wp
 from wfluid.kernels.cell.real import Real

@@ -1,4 +1,4 @@
-"""Files that appear complete or not at all, and what killed processes leave of them."""
+"""Files appear complete or not at all; temporary files of killed processes are removed."""
 
 import os
 import platform
@@ -37,22 +37,22 @@ def write(path):
         return temporary.name
 
 
-def test_a_writer_removes_what_a_killed_process_left_of_its_file(tmp_path):
+def test_a_writer_removes_the_temporary_file_of_a_killed_process(tmp_path):
     left = killed_while_writing(tmp_path / "a.png")
     write(tmp_path / "a.png")
     assert not left.exists() and [path.name for path in tmp_path.iterdir()] == ["a.png"]
 
 
-def test_another_file_of_the_folder_keeps_its_leftovers(tmp_path):
-    """Only the writer of a file knows that nobody needs what is left of it."""
+def test_temporary_files_of_other_files_are_kept(tmp_path):
+    """Only the writer of a file may remove its temporary files."""
     left = [killed_while_writing(tmp_path / name) for name in ("a.png", "b.gif", "ab.png", "a.1001.png")]
     write(tmp_path / "b.png")
     check_folder(tmp_path / "b.png")
     assert all(path.exists() for path in left)
 
 
-def test_a_process_of_another_machine_keeps_its_file(tmp_path):
-    """In a folder that machines share, a number that is no process here may be one there."""
+def test_temporary_files_of_other_hosts_are_kept(tmp_path):
+    """In a shared folder, a process number that is unused on this host may be used on another."""
     left = killed_while_writing(tmp_path / "a.png", "another-machine")
     check_folder(tmp_path / "a.png")
     write(tmp_path / "a.png")
@@ -62,7 +62,7 @@ def test_a_process_of_another_machine_keeps_its_file(tmp_path):
 @pytest.mark.parametrize(
     "name", [".backup.2023.part.zip", ".movie.99999999.part.mkv", ".a.99999999.part.png"]
 )
-def test_files_of_other_programs_stay(tmp_path, name):
+def test_files_of_other_programs_are_kept(tmp_path, name):
     (tmp_path / name).write_bytes(b"x")
     for path in (tmp_path / "a.png", tmp_path / "movie.mkv", tmp_path / "backup.zip"):
         check_folder(path)
@@ -78,7 +78,7 @@ def test_a_check_removes_nothing(tmp_path):
     assert left.exists()
 
 
-def test_a_living_process_keeps_its_file(tmp_path):
+def test_temporary_files_of_running_processes_are_kept(tmp_path):
     with atomic_file(tmp_path / "a.png") as temporary:
         temporary.write_bytes(b"x")
         subprocess.run([sys.executable, "-c", KILLED.replace("os.kill", "0 and os.kill"), tmp_path / "a.png"])
@@ -87,7 +87,7 @@ def test_a_living_process_keeps_its_file(tmp_path):
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/stat"), reason="starts of processes are not known")
-def test_a_process_number_that_went_to_another_process_protects_nothing(tmp_path):
+def test_a_reused_process_number_does_not_protect_a_temporary_file(tmp_path):
     left = killed_while_writing(tmp_path / "a.png")
     *_, process, _ = left.name.removesuffix(".part.png").split("-")
     left.rename(tmp_path / left.name.replace(f"-{process}-", f"-{os.getpid()}-"))
@@ -97,7 +97,7 @@ def test_a_process_number_that_went_to_another_process_protects_nothing(tmp_path
 
 @pytest.mark.parametrize("ending", [".png", ".exr", ".gif", ""])
 def test_a_temporary_name_is_hidden_and_keeps_the_ending(tmp_path, ending):
-    """Libraries choose a format by the ending."""
+    """Libraries choose the format by the ending."""
     name = write(tmp_path / f"a.b{ending}")
     assert name.startswith(".a") and name.endswith(f".part{ending or '.b'}" if ending else ".part.b")
 
@@ -111,7 +111,7 @@ def test_the_longest_names_can_be_written(tmp_path, monkeypatch, letter):
     assert len(set(temporary)) == len(temporary) == len(list(tmp_path.iterdir()))
 
 
-def test_a_failure_leaves_the_file_as_it_was(tmp_path):
+def test_a_failure_leaves_the_old_file(tmp_path):
     write(tmp_path / "a.png")
     with pytest.raises(RuntimeError), atomic_file(tmp_path / "a.png") as temporary:
         temporary.write_bytes(b"half")

@@ -1,4 +1,4 @@
-"""Ctrl-C stops work where it can stop, wherever it comes."""
+"""Ctrl-C stops work at the next check, whenever it is pressed."""
 
 import os
 import signal
@@ -11,13 +11,13 @@ from wfluid.system.interrupt import HeldInterrupt
 
 
 def press():
-    """Ctrl-C, heeded before this returns."""
+    """Press Ctrl-C; the signal is handled before this returns."""
     os.kill(os.getpid(), signal.SIGINT)
     time.sleep(0.01)
 
 
 class Pressing:
-    """Is interrupted while it is taken down, where Python forgets exceptions."""
+    """Is interrupted in its destructor, where Python drops exceptions."""
 
     def __del__(self):
         press()
@@ -32,7 +32,7 @@ def test_an_interrupt_within_a_destructor_is_not_lost():
             interrupt.check()
 
 
-def test_the_first_interrupt_waits_and_the_second_does_not():
+def test_the_first_interrupt_is_deferred_and_the_second_is_not():
     reached = False
     with pytest.raises(KeyboardInterrupt), HeldInterrupt():
         press()
@@ -42,14 +42,14 @@ def test_the_first_interrupt_waits_and_the_second_does_not():
     assert reached
 
 
-def test_afterwards_interrupts_are_what_they_were():
+def test_the_signal_handler_is_restored():
     before = signal.getsignal(signal.SIGINT)
     with HeldInterrupt():
         assert signal.getsignal(signal.SIGINT) != before
     assert signal.getsignal(signal.SIGINT) == before
 
 
-def test_other_threads_hold_nothing():
+def test_other_threads_do_not_defer_interrupts():
     before, inside = signal.getsignal(signal.SIGINT), []
 
     def work():

@@ -1,4 +1,4 @@
-"""What a map shows at any place: interpolated within, continued beyond the edges as the walls have it."""
+"""Sources at any place: interpolated inside, continued beyond the edges by the boundary conditions."""
 
 import numpy as np
 import pytest
@@ -14,19 +14,19 @@ WALLS = ("free-slip", "no-slip", "periodic", "no-slip,periodic", "periodic,free-
 
 
 def map_of(displacement, grid=GRID, walls="free-slip"):
-    """Of a function of x and y, which gives both components."""
+    """The map of a function of x and y that returns both components of the displacement."""
     values = np.stack([np.broadcast_to(d, (grid.ny, grid.nx)) for d in displacement(*centres(grid))], axis=2)
     return CoordinateMap(grid, Walls.parse(walls), values)
 
 
 def inner(count=200, cells=2.0, seed=0):
-    """Random places so far from the edges."""
+    """Random places at a distance from the edges."""
     room = cells * np.array([GRID.hx, GRID.hy])
     return np.random.default_rng(seed).uniform(room, np.array([GRID.width, GRID.height]) - room, (count, 2))
 
 
 def smooth(walls):
-    """A displacement that keeps to walls as a flow's does: along free-slip ones it has no slope."""
+    """A displacement that meets the boundary conditions: along free-slip walls it has no normal slope."""
     along_x, along_y = (np.cos if wall is Wall.FREE_SLIP else np.sin for wall in (walls.x, walls.y))
 
     def displacement(x, y):
@@ -37,15 +37,15 @@ def smooth(walls):
 
 
 @pytest.mark.parametrize("walls", WALLS)
-def test_centres_show_what_the_map_has_there(walls):
-    """source_at(centre) = source_of[centre], to the edge."""
+def test_the_interpolated_map_equals_the_map_at_centres(walls):
+    """source_at(centre) = source_of[centre], up to the edge."""
     warp = map_of(lambda x, y: (0.1 * x * y, 0.2 * x - y * y), walls=walls)
     x, y = centres(GRID)
     places = np.stack(np.broadcast_arrays(x, y), axis=-1).reshape(-1, 2)
     np.testing.assert_allclose(warp.source_at(places), warp.source_of.reshape(-1, 2), rtol=0, atol=1e-13)
 
 
-def test_a_quadratic_displacement_is_shown_exactly():
+def test_a_quadratic_displacement_is_interpolated_exactly():
     """Catmull-Rom reproduces polynomials up to the second degree, along x and along y."""
 
     def displacement(x, y):
@@ -57,8 +57,8 @@ def test_a_quadratic_displacement_is_shown_exactly():
 
 
 @pytest.mark.parametrize("walls", WALLS)
-def test_a_smooth_displacement_is_shown_to_third_order(walls):
-    """Everywhere, beyond the last centres too: the error of the interpolation falls at least with h^3."""
+def test_a_smooth_displacement_is_interpolated_to_third_order(walls):
+    """The error of the interpolation falls at least with h^3, beyond the last centres too."""
     displacement, errors = smooth(Walls.parse(walls)), []
     places = np.random.default_rng(1).uniform((0, 0), (GRID.width, GRID.height), (400, 2))
     for factor in (1, 2, 4):
@@ -82,8 +82,8 @@ def test_it_agrees_with_bilinear_interpolation_to_second_order():
     assert np.all((slopes > 1.7) & (slopes < 2.3)), slopes
 
 
-def test_what_wraps_is_shown_on_both_sides():
-    """Places on opposite edges of a periodic axis show one displacement; noise crosses the edge."""
+def test_a_periodic_map_is_equal_on_opposite_edges():
+    """Places on opposite edges of a periodic axis have the same displacement, also for noise."""
     noise = np.random.default_rng(2).normal(0, 0.1, (GRID.ny, GRID.nx, 2))
     warp = CoordinateMap(GRID, Walls.parse("periodic"), noise)
     for n, size in enumerate((GRID.width, GRID.height)):
@@ -102,8 +102,8 @@ def test_what_wraps_is_shown_on_both_sides():
 
 
 @pytest.mark.parametrize("walls", ["free-slip", "no-slip"])
-def test_nothing_is_shown_through_a_wall(walls):
-    """On a wall the component across it is 0; along it the picture slides, or is 0 too where it sticks."""
+def test_sources_do_not_cross_a_wall(walls):
+    """On a wall the normal component is 0; the tangential one is free, or 0 on a no-slip wall."""
     noise = np.random.default_rng(3).normal(0, 0.1, (GRID.ny, GRID.nx, 2))
     warp = CoordinateMap(GRID, Walls.parse(walls), noise)
     for n, size in enumerate((GRID.width, GRID.height)):
@@ -120,8 +120,8 @@ def test_nothing_is_shown_through_a_wall(walls):
     np.testing.assert_allclose(warp.source_at(corners), corners, atol=1e-13)
 
 
-def test_what_slides_along_a_wall_has_no_slope_there():
-    """Beside a free-slip wall a constant slide is shown exactly, up to the wall itself."""
+def test_a_displacement_along_a_free_slip_wall_has_no_slope():
+    """Beside a free-slip wall a constant tangential displacement is interpolated exactly, up to the wall."""
     warp = map_of(lambda x, y: (0.05 + 0 * x * y, 0 * x * y))
     places = inner(50, cells=3)
     places[:, 1] = np.linspace(0, GRID.height, 50)
@@ -129,8 +129,8 @@ def test_what_slides_along_a_wall_has_no_slope_there():
     np.testing.assert_allclose(warp.source_at(places), expected, rtol=0, atol=1e-13)
 
 
-def test_the_run_shows_its_points_where_they_came_from(make_solver):
-    """source_at(goes_to(p)) = p along a real run, at the points' own places, not only at centres."""
+def test_the_map_of_a_run_leads_from_points_back_to_their_start(make_solver):
+    """source_at(position of p) = p along a run, at the tracked positions, not only at centres."""
     points = np.random.default_rng(4).uniform(0.25, 0.75, (40, 2)) * (1, 0.9)
     solver = make_solver(64, 64, viscosity=0.01)
     now, then = solver.rest(points), solver.rest(points)

@@ -10,7 +10,7 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
 
 QUEUED_FRAMES = 4
-"""Frames that may wait to be written while the next are computed: evens out frames that are slow to write."""
+"""Largest number of frames that wait to be written while the next are computed."""
 
 ShownFrame = TypeVar("ShownFrame", bound=Frame)
 
@@ -27,16 +27,16 @@ class RunTimes:
 
 @dataclass(eq=False)
 class Run(Generic[ShownFrame]):
-    """An iterator of frames, computed as they are asked for, with measurements of this run alone."""
+    """An iterator that computes frames on request, with measurements of this run alone."""
 
     frames: Iterator[ShownFrame]
-    """The frames that are still to come."""
+    """Iterator of the remaining frames."""
     frame_count: int
-    """Frames in all."""
+    """Total number of frames."""
     seconds: RunTimes = field(default_factory=RunTimes)
     """Time spent on the frames so far."""
     seam: Seam | None = None
-    """Of a loop: how well its end meets its beginning, measured once all frames are made; else None."""
+    """Difference between end and beginning of a loop, measured after the last frame; None without a loop."""
 
     def __iter__(self) -> Iterator[ShownFrame]:
         return self

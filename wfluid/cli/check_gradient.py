@@ -1,4 +1,4 @@
-"""wfluid check-gradient: Taylor's test of the gradients of a scene, in double precision."""
+"""wfluid check-gradient: the Taylor test of the gradients of a scene, in double precision."""
 
 from __future__ import annotations
 
@@ -21,52 +21,52 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import flatten
 from wfluid.scene.scene import Scene
 from wfluid.staging.aims import Aims
-from wfluid.staging.build import stage_all
+from wfluid.staging.build import StagedKeyframes, stage_all
 
 TIGHT = 1e-12
-"""Tolerance of the solves, so that the gradient with respect to viscosity is exact too."""
+"""Tolerance of the solves; the gradient with respect to viscosity is exact only for exact solves."""
 
 DENSITY_WEIGHT = 1e-3
-"""Of a density's square beside the displacement's, which is as small."""
+"""Weight of the density terms in the objective; displacements are small numbers."""
 
 
 def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> int:
-    """Test every number of a scene that has a gradient; print a table; `FAILED` if one is wrong.
+    """Test the gradient with respect to every variable of a scene; print a table; `FAILED` if one is wrong.
 
-    The objective is the misfit of its keyframes, if it has some; else the mean square of the displacement,
-    and of densities, at the end. Forces that were found for its keyframes act too.
+    The objective is the misfit of the keyframes; without keyframes, the mean square of the displacement and
+    of the densities at the end. Forces found for the keyframes act too.
 
     Raises:
-        ValueError: a scene that has nothing to vary, or that cannot run.
+        ValueError: a scene without variables, or with an error.
     """
     staged = stage_all(scene, device, lambda text: print(f"wfluid check-gradient: {text}", file=sys.stderr))
-    animation, aims = staged.animation, staged.aims
+    animation, aims = staged.animation, staged.aims if isinstance(staged, StagedKeyframes) else None
     functional = _functional(replace(animation, cells=cells), aims)
     grid, steps = functional.grid, functional.timeline.steps
-    seen = "mean square of " + " and ".join(["the displacement", *animation.fluid.density_names])
+    objective = "mean square of " + " and ".join(["the displacement", *animation.fluid.density_names])
     if aims:
-        seen = f"misfit of {len(aims.keyframes)} keyframes"
-    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: {seen}")
-    print(f"{'numbers':44s} {'free':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>6s}")
+        objective = f"misfit of {len(aims.keyframes)} keyframes"
+    print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: {objective}")
+    print(f"{'variable':44s} {'size':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>9s}")
     wrong = 0
     for rate in taylor_rates(functional, seed=seed):
         shown = f"{rate.rate:.3f}"
         if not np.isfinite(rate.rate):
-            shown = "linear" if np.isinf(rate.rate) else "unseen"
+            shown = "linear" if np.isinf(rate.rate) else "constant"
         verdict = "" if rate.holds else f"  below {LEAST_RATE}"
-        numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>6s}"
+        numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>9s}"
         print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
         wrong += not rate.holds
     return Exit.FAILED if wrong else Exit.DONE
 
 
 def _functional(animation: Animation, aims: Aims | None) -> Functional:
-    """A functional of everything in an animation that can vary."""
+    """The objective as a function of all variables of an animation."""
     grid, timeline, device = animation.grid, animation.timeline, animation.device
     fluid = replace(animation.fluid, diffusion_tolerance=TIGHT, pressure_tolerance=TIGHT)
     found = aims.found if aims else ()
     setup = Setup(fluid, (*flatten(animation.forces), *found), np.zeros((2, grid.ny, grid.nx)))
-    names = [name for name in known_names(setup) if not _held(name, setup)]
+    names = [name for name in known_names(setup) if not _excluded(name, setup)]
     free = [Free(name, _scale(name, setup)) for name in names]
     objective = _misfit(aims) if aims else _objective(grid, fluid, timeline.end)
     return Functional(grid, fluid, setup.forces, timeline, objective, free, device=device)
@@ -92,8 +92,8 @@ def _objective(grid: Grid, fluid: Fluid, end: float) -> Objective:
     return total
 
 
-def _held(name: str, setup: Setup) -> bool:
-    """What is not tested: a viscosity of 0, or one that sweeps solve for, has no gradient to rely on."""
+def _excluded(name: str, setup: Setup) -> bool:
+    """Whether a variable is left out: the gradient of viscosity is unreliable at 0 and with Jacobi sweeps."""
     if name != VISCOSITY:
         return False
     none = isinstance(setup.fluid.viscosity, float) and setup.fluid.viscosity == 0
@@ -101,7 +101,7 @@ def _held(name: str, setup: Setup) -> bool:
 
 
 def _scale(name: str, setup: Setup) -> float:
-    """About how large the numbers are, for steps in proportion."""
+    """The magnitude of a variable: test steps are in proportion to it."""
     if name.rpartition(".")[2] in POSITIVE or name == VELOCITY:
         return 1.0
     values = np.abs(np.asarray(setup.number(name), dtype=np.float64))

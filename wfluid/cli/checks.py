@@ -1,4 +1,4 @@
-"""What is refused of a run before anything is computed or written."""
+"""Checks of a run before anything is computed or written."""
 
 from __future__ import annotations
 
@@ -14,39 +14,41 @@ from wfluid.scene.schema import SchemaError
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a scene is run."""
+    """Options of a run that are not part of the scene."""
 
     device: str | None = None
-    """"cpu" (default), "cuda", …"""
+    """Device: "cpu" (default), "cuda", …"""
     quiet: bool = False
-    """No progress and no notes on stderr."""
+    """Whether to print no progress and no notes."""
     dry_run: bool = False
-    """Say what would be computed and written, and stop."""
+    """Whether to print the plan and stop."""
     preview: str | None = None
-    """Draw the controls on the picture to this file, and stop."""
+    """File for a drawing of the controls on the picture, instead of a run."""
     save_scene: str | None = None
-    """Write the scene to this file, and go on if there is an output."""
+    """File to save the scene to; the run continues if the scene has outputs."""
     plot: str | None = None
-    """Draw what keyframes came to, to this file."""
+    """File for a figure of the search for keyframes."""
 
 
 def check_run(scene: Scene, options: RunOptions) -> None:
     """Refuse a run without motion or output, and files that cannot be written.
 
     Raises:
-        ValueError: what is missing.
-        FileError: a name that cannot be written.
-        SceneError: an output that no format has.
+        ValueError: no motion, no output, or two outputs with one name.
+        FileError: a file that cannot be written.
+        SceneError: settings of an output that its format does not have.
     """
     if not (scene.forces or scene.densities or scene.keyframes):
         raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
     if options.plot:
         if not scene.keyframes:
-            raise ValueError("--plot draws keyframes: the scene has none")
+            raise ValueError(
+                "--plot draws the search for keyframes, and the scene has none: give --move, or leave it out"
+            )
         check_plot(options.plot)
     asked = options.preview or options.save_scene or options.plot or options.dry_run
     if not (scene.outputs or asked):
-        raise ValueError("where to? give -o OUT, such as -o out.gif, or --preview FILE.png")
+        raise ValueError("no output: give -o OUT, such as -o out.gif, or --preview FILE.png")
     for n, output in enumerate(scene.outputs):
         try:
             _ = output.encoding
@@ -57,16 +59,16 @@ def check_run(scene: Scene, options: RunOptions) -> None:
 
 
 def _check_names(scene: Scene, options: RunOptions) -> None:
-    """Refuse to write over what is read, or one file twice."""
+    """Refuse to write over a file that is read, or one file twice."""
     frames = scene.frame_count
-    taken = {path.resolve(): "a picture that is read" for path in scene.files()}
+    taken = {path.resolve(): "an input of the scene" for path in scene.files()}
     taken[(scene.folder / scene.picture.file).resolve()] = "the picture itself"
     taken[Path(scene.source).resolve()] = "the scene itself"
     written = [
-        (scene.folder / output.file, f"written as the {output.of}", output.start) for output in scene.outputs
+        (scene.folder / output.file, f"the output of {output.of!r}", output.start) for output in scene.outputs
     ]
     written += [
-        (Path(name), f"written by {flag}", 0)
+        (Path(name), f"the output of {flag}", 0)
         for flag, name in (
             ("--preview", options.preview),
             ("--save-scene", options.save_scene),
@@ -78,12 +80,12 @@ def _check_names(scene: Scene, options: RunOptions) -> None:
         check_folder(path)
         for name in files_written(path, start, frames):
             if name in taken:
-                raise ValueError(f"{name}: that is {taken[name]}; write to another name")
+                raise ValueError(f"{name} is {taken[name]}: write to another name")
             taken[name] = what
 
 
 def _check_endings(scene: Scene, options: RunOptions) -> None:
-    """Refuse a report that is no JSON, a scene that is no TOML."""
+    """Refuse a report without the ending .json, a scene without .toml."""
     reports = [scene.folder / output.file for output in scene.outputs if output.of == "report"]
     scenes = [Path(options.save_scene)] if options.save_scene else []
     for paths, ending, what in ((reports, ".json", "a report"), (scenes, ".toml", "a scene")):

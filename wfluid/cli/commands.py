@@ -1,10 +1,14 @@
-"""What each command does with its parsed flags."""
+"""The commands, each run with its parsed flags."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wfluid.scene.scene import Scene
 
 
 def run_warmup(options: argparse.Namespace) -> int:
@@ -27,7 +31,7 @@ def run_animate(options: argparse.Namespace) -> int:
 
 
 def run_render(options: argparse.Namespace) -> int:
-    """Read a scene, set what is set, and run it."""
+    """Read a scene, change the values given by --set, and run it."""
     from wfluid.scene.toml_file import read_scene
 
     scene = read_scene(options.scene).with_values(options.set)
@@ -35,7 +39,7 @@ def run_render(options: argparse.Namespace) -> int:
 
 
 def run_check_gradient(options: argparse.Namespace) -> int:
-    """Test the gradients of a scene; in a process of its own where this one is not in double precision."""
+    """Test the gradients of a scene; in a second process if this one is not in double precision."""
     double = {"WFLUID_PRECISION": "float64"}
     if os.environ.get("WFLUID_PRECISION") != double["WFLUID_PRECISION"]:
         import subprocess
@@ -51,7 +55,7 @@ def run_check_gradient(options: argparse.Namespace) -> int:
     return check_gradient(scene, options.cells, options.device, options.seed)
 
 
-def _run(scene, options: argparse.Namespace) -> int:
+def _run(scene: Scene, options: argparse.Namespace) -> int:
     from wfluid.cli.checks import RunOptions
     from wfluid.cli.render import run_scene
 

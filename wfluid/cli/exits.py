@@ -6,13 +6,13 @@ from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """What a command ends with."""
+    """Exit code of a command."""
 
     DONE = 0
-    """All went well."""
+    """Success."""
     FAILED = 1
-    """The run failed, or its result is not good enough."""
+    """The run failed, a residual is too large, or the picture folds."""
     INPUT = 2
-    """Bad input, said in one line on stderr."""
+    """Bad input; the message is one line on stderr."""
     INTERRUPTED = 130
     """Ended by Ctrl-C."""

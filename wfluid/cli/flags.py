@@ -1,4 +1,4 @@
-"""The flags of the commands that make a scene; those of single keys come from the fields of its tables."""
+"""The flags of the commands that make a scene; a flag of one key comes from the field of its table."""
 
 from __future__ import annotations
 
@@ -29,8 +29,18 @@ def drawn_flag(kind: str) -> str:
     return "--force-image" if kind == "image" else f"--{kind}"
 
 
+def scene_tables() -> dict[str, Table]:
+    """The tables of a scene by their keys; of an array, the table of its items."""
+    found = {}
+    for name, what in SCENE.keys.items():
+        table = what.each if isinstance(what, ArrayOf) else what
+        if isinstance(table, Table):
+            found[name] = table
+    return found
+
+
 def add_animate(parser: argparse.ArgumentParser) -> None:
-    """The flags of animate."""
+    """Add the flags of animate."""
     parser.add_argument("picture", metavar="PICTURE", help="the picture to animate")
     _add_forces(parser)
     _add_companions(parser)
@@ -39,13 +49,17 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 
 def add_keyframes(parser: argparse.ArgumentParser) -> None:
-    """The flags of keyframes."""
+    """Add the flags of keyframes."""
     add = parser.add_argument
     add("picture", metavar="PICTURE", help="the picture to animate")
-    add("--move", **repeated("X0,Y0:X1,Y1[@T]", "the point X0,Y0 should be at X1,Y1 at T seconds [px]"))
-    add("--pin", **repeated("X,Y", "this point should stay [px]"))
-    add("--points", metavar="FILE.csv", help="moves in a file: from x, from y, to x, to y[, seconds]")
-    text = f"when points arrive whose time is not given [s] ({KEYFRAME_TIME:g}, or the duration)"
+    add("--move", **repeated("X0,Y0:X1,Y1[@T]", "move the point X0,Y0 to X1,Y1 [px] by time T [s]"))
+    add("--pin", **repeated("X,Y", "keep this point in place [px]"))
+    add(
+        "--points",
+        metavar="FILE.csv",
+        help="read moves from a CSV file: from x, from y, to x, to y [px][, time [s]]",
+    )
+    text = f"arrival time of moves without one [s] (the duration, or else {KEYFRAME_TIME:g})"
     add("--time", type=float, help=text)
     add_plot(parser)
     _add_forces(parser)
@@ -55,37 +69,46 @@ def add_keyframes(parser: argparse.ArgumentParser) -> None:
 
 
 def add_morph(parser: argparse.ArgumentParser) -> None:
-    """The flags of morph."""
-    delay = SCENE.keys["morph"].keys["delay"].shown_default
+    """Add the flags of morph."""
     add = parser.add_argument
-    add("picture", metavar="A", help="the picture to begin with")
-    add("to", metavar="B", help="the picture that it flows into")
-    add("--points", metavar="FILE.csv", help="points that correspond: x in A, y in A, x in B, y in B [px]")
-    add("--move", **repeated("X0,Y0:X1,Y1", "the point X0,Y0 of A is X1,Y1 of B [px]"))
-    add("--pin", **repeated("X,Y", "this point of A should stay [px]"))
-    text = f"a mask, white where it happens first, black DELAY later ({delay})"
+    add("picture", metavar="A", help="the first picture")
+    add("to", metavar="B", help="the second picture")
+    add(
+        "--points",
+        metavar="FILE.csv",
+        help="read corresponding points from a CSV file: x, y in A, x, y in B [px]",
+    )
+    add("--move", **repeated("X0,Y0:X1,Y1", "the point X0,Y0 of A corresponds to X1,Y1 of B [px]"))
+    add("--pin", **repeated("X,Y", "keep this point of A in place [px]"))
+    delay = _default("morph", "delay")
+    text = f"mask: black parts morph later than white ones, by DELAY, a part of the duration ({delay})"
     add("--timing", metavar="MASK[:DELAY]", help=text)
     add_plot(parser)
     _add_keys(parser, morphs=True)
     _add_shot(parser)
 
 
+def _default(table: str, name: str) -> str:
+    """The default of a key, for a help text."""
+    key = scene_tables()[table].keys[name]
+    return key.shown_default if isinstance(key, Key) else ""
+
+
 # Flags of a scene's keys
 
 
 def _add_keys(parser: argparse.ArgumentParser, without: Sequence[str] = (), morphs: bool = False) -> None:
-    """The flags of a scene's keys and of its tables', `without` some; of a morph those it has a use for."""
+    """Add the flags of keys, `without` those of some tables; for a morph only those of allowed keys."""
     add_key_flags(parser, "scene", SCENE.meaning, SCENE.keys)
-    for name, what in SCENE.keys.items():
-        table = what.each if isinstance(what, ArrayOf) else what
-        if not isinstance(table, Table) or name in without or (morphs and name in SCENE.not_in_morph):
+    for name, table in scene_tables().items():
+        if name in without or (morphs and name in SCENE.not_in_morph):
             continue
         keys = {key: one for key, one in table.keys.items() if not (morphs and key in table.not_in_morph)}
         add_key_flags(parser, name, table.meaning, keys)
 
 
 def add_key_flags(parser: argparse.ArgumentParser, name: str, meaning: str, keys: Mapping[str, Any]) -> None:
-    """Add a group of flags, one for each key that has one."""
+    """Add a group with a flag for each key that has one."""
     flags = {key.flag: key for key in keys.values() if isinstance(key, Key) and key.flag}
     if flags:
         group = parser.add_argument_group(name, meaning)
@@ -94,7 +117,7 @@ def add_key_flags(parser: argparse.ArgumentParser, name: str, meaning: str, keys
 
 
 def _add_key_flag(group: Any, flag: str, key: Key) -> None:
-    """Add the flag of a key, whose value is None where it is not given."""
+    """Add the flag of a key; its value is None if it is not given."""
     unit = f" [{key.unit}]" if key.unit else ""
     words = f": {', '.join(key.kind.words)}" if key.kind.words else ""
     default = f" ({key.shown_default})" if key.shown_default and key.kind.read is not bool else ""
@@ -106,12 +129,12 @@ def _add_key_flag(group: Any, flag: str, key: Key) -> None:
         group.add_argument(flag, type=type_, metavar=key.metavar, dest=flag_name(flag), help=text)
 
 
-# Flags that say more than one key
+# Flags that set several keys
 
 
 def _add_forces(parser: argparse.ArgumentParser) -> None:
-    """The short forms of forces and densities."""
-    group = parser.add_argument_group("forces", "What moves the picture, places and lengths in pixels")
+    """Add the short forms of forces and densities."""
+    group = parser.add_argument_group("forces", "Forces and densities; places and lengths in pixels")
     for kind, (form, *_) in FORMS.items():
         if kind in DENSITIES:
             meaning, keys = f"pour {kind} of a colour", list(DENSITY_OPTIONS)
@@ -126,22 +149,19 @@ def _add_forces(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_companions(parser: argparse.ArgumentParser) -> None:
-    """The flags of what goes with the picture."""
+    """Add the flags of followed points and layers."""
     add = parser.add_argument
-    add("--track", **repeated("X,Y", "follow this point"))
-    add("--tracks", metavar="FILE.csv", help="write where the followed points go")
-    text = "a picture or matte that goes through the same map, written beside OUT as OUT_FILE"
+    add("--track", **repeated("X,Y", "follow this point [px]"))
+    add("--tracks", metavar="FILE.csv", help="write the paths of the followed points")
+    text = "warp another picture or matte by the same map; it is written beside OUT as OUT_FILE"
     add("--layer", **repeated("FILE", text))
 
 
 def _add_shot(parser: argparse.ArgumentParser) -> None:
-    """The flags of every command that makes a scene."""
-    strength = SCENE.keys["freeze"].keys["strength"]
-    text = f"a mask, white where the picture stays (drag {strength.shown_default}/s)"
+    """Add the flags of every command that makes a scene."""
+    text = f"mask: white parts stay in place, by a drag of STRENGTH [1/s] ({_default('freeze', 'strength')})"
     parser.add_argument("--freeze", metavar="MASK[:STRENGTH]", help=text)
-    text = "x.gif, x.mp4, x.webm, or a sequence such as x.####.png"
+    text = "write the frames to OUT: x.gif, x.mp4, x.webm, or a sequence such as x.####.png"
     parser.add_argument("-o", "--output", **repeated("OUT", text))
-    parser.add_argument(
-        "--save-scene", metavar="FILE.toml", help="write what this command line says as a scene"
-    )
+    parser.add_argument("--save-scene", metavar="FILE.toml", help="save this command line as a scene file")
     add_run(parser)

@@ -1,4 +1,4 @@
-"""The scene that a command line of animate, keyframes or morph says, and the flags of its keys."""
+"""The scene of a command line of animate, keyframes or morph."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from wfluid.cli.flags import DENSITIES, KEYFRAME_TIME, drawn_flag, flag_name
+from wfluid.cli.flags import DENSITIES, KEYFRAME_TIME, drawn_flag, flag_name, scene_tables
 from wfluid.domain.limits import KEYFRAME_VISCOSITY
 from wfluid.files.names import numbering
 from wfluid.files.points import read_points
@@ -21,20 +21,20 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
     """The scene of a command line.
 
     Raises:
-        ValueError: a flag that makes no sense, by its name.
-        SceneError: a value out of its range.
+        ValueError: a flag with a wrong value; the message names the flag.
+        SceneError: a value outside its range.
     """
     tables: dict[str, Any] = {"wfluid": VERSION, **given_keys(options, SCENE)}
     tables["picture"] = {"file": options.picture}
-    for name, what in SCENE.keys.items():
-        if isinstance(what, Table) and name not in ("keyframes", "morph"):
-            tables[name] = {**tables.get(name, {}), **given_keys(options, what)}
+    for name, table in scene_tables().items():
+        if name not in ("keyframes", "morph"):
+            tables[name] = {**tables.get(name, {}), **given_keys(options, table)}
     _check_viscosity(options)
     if options.verb == "keyframes" and not {"value", "image"} & tables["viscosity"].keys():
         tables["viscosity"]["value"] = KEYFRAME_VISCOSITY
     if options.freeze is not None:
-        tables["freeze"] = _freeze(options.freeze)
-    flags = {}
+        tables["freeze"] = dict(zip(("mask", "strength"), _mask_and_number(options.freeze), strict=False))
+    flags: dict[tuple, str] = {}
     tables["force"], tables["density"] = [], []
     _add_drawn(options, tables, flags)
     if options.verb == "morph":
@@ -53,7 +53,7 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
 
 
 def _flags(what: Any, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, str]]:
-    """What of a command line says a key, by its path, for every key that the tables could have."""
+    """The flag, or the form, that sets a key, by the path of the key."""
     if isinstance(what, Key):
         if what.flag or what.form:
             yield path, what.flag or what.form
@@ -69,17 +69,19 @@ def given_keys(options: argparse.Namespace, table: Table) -> dict[str, Any]:
     """The keys of a table whose flags are given."""
     found = {}
     for name, key in table.keys.items():
-        value = getattr(options, flag_name(key.flag), None) if isinstance(key, Key) and key.flag else None
+        if not isinstance(key, Key) or not key.flag:
+            continue
+        value = getattr(options, flag_name(key.flag), None)
         if value is not None:
             found[name] = _read(key, value) if isinstance(value, str) else value
     return found
 
 
 def _read(key: Key, text: str) -> Any:
-    """A key's value from a text.
+    """The value of a key from a text.
 
     Raises:
-        ValueError: a text that is no such value, with the flag.
+        ValueError: a wrong text; the message names the flag.
     """
     try:
         return key.kind.read(text)
@@ -88,12 +90,12 @@ def _read(key: Key, text: str) -> Any:
 
 
 def _several(options: argparse.Namespace, name: str) -> list[str]:
-    """What a flag that may be repeated says; nothing where the command does not have it."""
+    """The values of a repeatable flag; none if the command does not have it."""
     return getattr(options, name, [])
 
 
 def _add_drawn(options: argparse.Namespace, tables: dict[str, Any], flags: dict[tuple, str]) -> None:
-    """Add the forces and densities of short forms, and the flag that each comes from."""
+    """Add the forces and densities of short forms, and the flag of each."""
     forces, densities = tables["force"], tables["density"]
     for kind in FORMS:
         flag = drawn_flag(kind)
@@ -110,11 +112,11 @@ def _add_drawn(options: argparse.Namespace, tables: dict[str, Any], flags: dict[
 
 
 def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
-    """Moves, those of a file among them, and pins; and what of the command line each move comes from."""
+    """The table of keyframes, with the moves of a file; and the flag of each move."""
     morphs = options.verb == "morph"
     if not (options.move or options.points):
         form = "X0,Y0:X1,Y1" + ("" if morphs else "[@T]")
-        raise ValueError(f"where to? give at least one --move {form}, or --points FILE.csv")
+        raise ValueError(f"no points to move: give at least one --move {form}, or --points FILE.csv")
     moves = [parse_move(text) for text in options.move]
     names = [f"--move {text}" for text in options.move]
     for row in read_points(options.points) if options.points else ():
@@ -128,23 +130,19 @@ def _keyframes(options: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
     table: dict[str, Any] = {"move": moves}
     if options.pin:
         table["pins"] = [as_pair(f"pin {text!r}", "the point X,Y", text) for text in options.pin]
-    return {**table, **given_keys(options, SCENE.keys["keyframes"])}, names
+    return {**table, **given_keys(options, scene_tables()["keyframes"])}, names
 
 
 def _morph(options: argparse.Namespace) -> dict[str, Any]:
-    """The other picture, and how it goes."""
-    table = {"to": options.to, **given_keys(options, SCENE.keys["morph"])}
+    """The table of a morph."""
+    table = {"to": options.to, **given_keys(options, scene_tables()["morph"])}
     if options.timing is not None:
         table |= dict(zip(("timing", "delay"), _mask_and_number(options.timing), strict=False))
     return table
 
 
-def _freeze(text: str) -> dict[str, Any]:
-    return dict(zip(("mask", "strength"), _mask_and_number(text), strict=False))
-
-
 def _mask_and_number(text: str) -> tuple[str, float] | tuple[str]:
-    """MASK:NUMBER, or a MASK whose name may have colons."""
+    """The parts of MASK:NUMBER; of MASK alone, whose name may contain colons, only the mask."""
     name, colon, number = text.rpartition(":")
     try:
         return (name, float(number)) if colon else (text,)
@@ -153,7 +151,7 @@ def _mask_and_number(text: str) -> tuple[str, float] | tuple[str]:
 
 
 def _check_viscosity(options: argparse.Namespace) -> None:
-    """Refuse flags that need a viscosity image which is not given."""
+    """Refuse flags that need a viscosity image without one."""
     if options.viscosity_image is None:
         for flag in ("--viscosity-floor", "--invert-viscosity", "--viscosity-moves"):
             if getattr(options, flag_name(flag)) is not None:
@@ -165,8 +163,8 @@ def _layer_name(file: str) -> str:
 
 
 def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
-    """The picture's outputs, and beside each those of the layers; tracks and report."""
-    stills, layers = given_keys(options, SCENE.keys["output"].each), _several(options, "layer")
+    """The outputs: pictures, each with those of the layers beside it; tracks and report."""
+    stills, layers = given_keys(options, scene_tables()["output"]), _several(options, "layer")
     numbered = [name for name in options.output if numbering(Path(name))] or options.output
     found = []
     for name in options.output:
@@ -178,12 +176,12 @@ def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
         if file is not None:
             found.append({"file": file, "of": of})
     if bool(_several(options, "track")) != (tracks is not None):
-        raise ValueError("--track X,Y and --tracks FILE.csv go together")
+        raise ValueError("--track X,Y and --tracks FILE.csv go together: give both")
     return found
 
 
 def _beside(output: str, layer: str) -> str:
-    """The name of a layer's output: the picture's, with the layer's name before number and ending."""
+    """The name of a layer's output: that of the picture, with the layer before number and ending."""
     path = Path(output)
     number = numbering(path)
     stem = path.name[: path.name.index(number)] if number else path.stem

@@ -1,10 +1,10 @@
-"""The commands and their parsers; the flags that say a scene are in `flags`, which loads its tables."""
+"""The parser of the command line; the flags that describe a scene are in `flags`."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from wfluid.cli.commands import run_animate, run_check_gradient, run_render, run_warmup
 from wfluid.cli.exits import Exit
@@ -22,37 +22,37 @@ EXAMPLES = {
 
 HELP = {
     "animate": "move a picture with forces",
-    "keyframes": "send points of a picture to places",
-    "morph": "let one picture flow into another",
+    "keyframes": "move points of a picture to targets",
+    "morph": "morph one picture into another",
     "render": "run a scene file",
     "check-gradient": "test the gradients of a scene",
     "warmup": "compile the kernels now",
 }
-"""What a command does, in a few words."""
+"""Short descriptions, by command."""
 
 DESCRIPTIONS = {
     "animate": "Move a picture with forces and write the frames.",
-    "keyframes": "Send points of a picture to places, in time: the forces that do it are found. "
-    "Exits with 1 if a point stays away from its place by more than the tolerance.",
-    "morph": "Let one picture flow into another through points of both: the flow that takes the ones to the "
-    "others is found. Exits with 1 if a point stays away by more than the tolerance.",
-    "render": "Run a scene file: everything a shot is made of, in TOML.",
-    "check-gradient": "Test by Taylor's rates, in double precision, the gradients with respect to every "
-    "number of a scene: 2 is exact, 1 is wrong.",
+    "keyframes": "Move points of a picture to targets at given times: a search finds the forces. "
+    "The exit code is 1 if the distance of a point from its target is larger than the tolerance.",
+    "morph": "Morph one picture into another: a search finds the flow that moves points of the first picture "
+    "to points of the second. The exit code is 1 if a distance is larger than the tolerance.",
+    "render": "Run a scene file, a TOML file that describes one shot.",
+    "check-gradient": "Test the gradient with respect to every variable of a scene by Taylor rates, in "
+    "double precision: a rate of 2 is right, 1 is wrong. The exit code is 1 if a rate is below 1.9.",
     "warmup": "Compile the kernels for a device, so that the first animation starts at once.",
 }
-"""What a command does, with what it ends with."""
+"""Descriptions with exit codes, by command."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, with the nearest flag or verb that exists."""
+    """Reports errors in one line, with the nearest known flag or verb."""
 
-    def __init__(self, *arguments, **settings):
-        super().__init__(*arguments, allow_abbrev=False, **settings)
+    def __init__(self, *arguments: Any, **settings: Any):
+        super().__init__(*arguments, **{"allow_abbrev": False, **settings})
         self._negative_number_matcher = re.compile(r"^-\.?\d")  # so that --wind -3,0 is a flag and its value
 
     def parse_known_args(self, args=None, namespace=None):
-        """Parse; an unknown flag is refused here, where the verb's own flags are known."""
+        """Parse; refuse unknown flags here, where the flags of the verb are known."""
         options, unknown = super().parse_known_args(args, namespace)
         for word in unknown:
             flag = word.partition("=")[0]
@@ -77,10 +77,10 @@ def _nearest(word: str, known: list[str]) -> str:
 
 
 class Version(argparse.Action):
-    """Prints what is installed, and the devices."""
+    """Prints the versions of the libraries, and the devices."""
 
-    def __call__(self, parser, *_) -> NoReturn:
-        """Load the libraries only now, when they are asked for."""
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        """Load the libraries only now."""
         import warp
 
         from wfluid.cli.report import versions
@@ -95,8 +95,8 @@ class Version(argparse.Action):
 class Keys(argparse.Action):
     """Prints the keys of a scene file."""
 
-    def __call__(self, parser, *_) -> NoReturn:
-        """Load the schema only now, when it is asked for."""
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        """Load the tables only now."""
         from wfluid.scene.reference import reference
 
         print(reference(), end="")
@@ -104,15 +104,15 @@ class Keys(argparse.Action):
 
 
 def build_parser(command: str | None = None) -> Parser:
-    """The parser of the command line, with a sub-parser a command.
+    """The parser of the command line, with a sub-parser for each command.
 
-    Where a command is named, only it gets its flags: those that say a scene take a while to load.
+    With `command`, only that one gets its flags: the tables behind them take time to load.
     """
     parser = Parser(
         prog="wfluid", description="Animate, warp and morph pictures by treating them as a fluid."
     )
-    parser.add_argument("--version", action=Version, nargs=0, help="versions of wfluid and what it runs on")
-    parser.epilog = "wfluid VERB --help explains a verb; example: " + EXAMPLES["animate"]
+    parser.add_argument("--version", action=Version, nargs=0, help="print the versions and devices, and stop")
+    parser.epilog = "wfluid VERB --help lists the flags of a verb; example: " + EXAMPLES["animate"]
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=Parser)
     for name, add_flags in (
         ("animate", _add_scene_flags),
@@ -139,8 +139,12 @@ def _add_scene_flags(parser: Parser, command: str) -> None:
 
 def _add_render_flags(parser: Parser, _: str) -> None:
     parser.set_defaults(run=run_render)
-    parser.add_argument("--keys", action=Keys, nargs=0, help="print every key of a scene, as Markdown")
-    parser.add_argument("-o", "--output", **repeated("OUT", "write the picture here instead"))
+    parser.add_argument(
+        "--keys", action=Keys, nargs=0, help="print every key of a scene as Markdown, and stop"
+    )
+    parser.add_argument(
+        "-o", "--output", **repeated("OUT", "write the picture to OUT instead of the scene's outputs")
+    )
     _add_scene_file(parser)
     add_plot(parser)
     add_run(parser)
@@ -150,7 +154,7 @@ def _add_check_gradient_flags(parser: Parser, _: str) -> None:
     parser.set_defaults(run=run_check_gradient)
     _add_scene_file(parser)
     parser.add_argument("--cells", type=int, default=48, help="cells along the longer side (48)")
-    parser.add_argument("--seed", type=int, default=0, help="of the random directions (0)")
+    parser.add_argument("--seed", type=int, default=0, help="random seed of the test directions (0)")
     add_device(parser)
 
 
@@ -160,7 +164,7 @@ def _add_warmup_flags(parser: Parser, _: str) -> None:
 
 
 def _add_scene_file(parser: Parser) -> None:
-    """The scene file, and what is set in it."""
-    parser.add_argument("scene", metavar="SCENE.toml", help="the scene")
-    text = "change a value, such as time.duration=1 or force.nose.radius=40"
+    """Add the scene file and --set."""
+    parser.add_argument("scene", metavar="SCENE.toml", help="the scene file")
+    text = "change a value of the scene, such as time.duration=1 or force.nose.radius=40"
     parser.add_argument("--set", **repeated("KEY=VALUE", text))

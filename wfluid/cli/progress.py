@@ -1,4 +1,4 @@
-"""How far a run is, on a terminal."""
+"""Progress of a run, on a terminal."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TextIO
 
 from wfluid.keyframes.search import Progress
 
-STAGES = {"march": "guessing", "coarse": "aiming, coarse", "fine": "aiming, fine"}
-"""What a search does, by stage."""
+STAGES = {"march": "first guess", "coarse": "coarse grid", "fine": "fine grid"}
+"""Names of the stages of a search."""
 
 
 class FrameProgress:
@@ -51,7 +51,7 @@ class FrameProgress:
 
 
 class SearchProgress:
-    """A line on stderr with iteration, objective and the point that is farthest; silent as frames are."""
+    """A line on stderr with iteration, objective and residual; silent when quiet or not on a terminal."""
 
     def __init__(self, side: float, quiet: bool, out: TextIO | None = None):
         self._side, self._out = side, out or sys.stderr
@@ -61,12 +61,13 @@ class SearchProgress:
         return self._show
 
     def _show(self, at: Progress) -> None:
+        """Show an iteration."""
         if self._quiet:
             return
         self._shown = True
         text = (
-            f"keyframes  {STAGES[at.stage]}: iteration {at.iteration}, phi {at.value:.3g}, "
-            f"farthest point {at.worst * self._side:.3g} px"
+            f"keyframes  {STAGES[at.stage]}: iteration {at.iteration}, objective {at.value:.3g}, "
+            f"residual {at.worst * self._side:.3g} px"
         )
         print(f"\r{text:<78}", end="", file=self._out, flush=True)
 

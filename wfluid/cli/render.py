@@ -1,4 +1,4 @@
-"""Runs a scene from the command line: says what it will do, writes all its outputs, reports."""
+"""Runs a scene from the command line: checks, search, frames, outputs, report."""
 
 from __future__ import annotations
 
@@ -21,69 +21,71 @@ from wfluid.fields.device import kernels_are_built, open_device
 from wfluid.keyframes.match import STOPPED, Match, match_keyframes
 from wfluid.keyframes.plot import plot_match
 from wfluid.keyframes.search import Progress
-from wfluid.morphing.morph import FACTORS as FACTORS_OF_MORPH
-from wfluid.morphing.morph import Morph
+from wfluid.morphing.morph import FACTORS, Morph
 from wfluid.pictures.stills import write_picture
 from wfluid.scene.scene import Scene
 from wfluid.scene.toml_file import write_scene
-from wfluid.staging.build import Staged, stage_all, with_found
+from wfluid.staging.aims import with_found
+from wfluid.staging.build import Staged, StagedKeyframes, StagedMorph, stage_all
 from wfluid.staging.preview import draw_controls
 from wfluid.system.interrupt import HeldInterrupt
 from wfluid.system.memory import readable_size
 
 
 def run_scene(scene: Scene, options: RunOptions) -> Exit:
-    """Run a scene; the exit code.
+    """Run a scene; returns the exit code.
 
     Raises:
-        ValueError: what is wrong with the scene or with the files it names.
+        ValueError: an error in the scene or in the files it names.
     """
     began = time.perf_counter()
     check_run(scene, options)
     notes: list[str] = []
     staged = stage_all(scene, options.device, notes.append)
     check_memory(staged.animation, kept_frames(scene), _morph_frames(staged))
-    first = staged.pair.a if staged.pair else staged.animation.picture
+    pair = staged.pair if isinstance(staged, StagedMorph) else None
+    first = pair.a if pair else staged.animation.picture
     notes += notes_of_outputs(scene, first, staged.animation.layers)
-    looks_only = bool(options.preview or options.dry_run)
-    outputs = [] if looks_only else open_writers(scene, staged.animation)
+    without_run = bool(options.preview or options.dry_run)
+    outputs = [] if without_run else open_writers(scene, staged.animation)
     note = _note(options.quiet)
-    for text in notes:  # only now: what is refused is one line
+    for text in notes:  # only now: an error above is a single line
         note(text)
 
-    searches = staged.aims is not None and not looks_only
-    if options.save_scene and not searches:
+    searched = staged if isinstance(staged, StagedKeyframes) and not without_run else None
+    if options.save_scene and not searched:
         write_scene(options.save_scene, _with_sizes(scene, staged))
     if options.dry_run:
-        _say_plan(scene, staged)
+        _print_plan(scene, staged)
         return Exit.DONE
     if options.preview:
-        write_picture(options.preview, draw_controls(scene, staged.animation, staged.aims))
-    if options.preview or not (scene.outputs or searches):
+        aims = staged.aims if isinstance(staged, StagedKeyframes) else None
+        write_picture(options.preview, draw_controls(scene, staged.animation, aims))
+    if options.preview or not (scene.outputs or searched):
         return Exit.DONE
 
     compiling = _load_kernels(staged.animation, options.quiet)
-    match = _find_forces(staged, options.quiet) if searches else None
-    if match:
-        _keep_match(match, scene, staged, options)
-    if not scene.outputs:
-        return _verdict(staged, match)
-    report, run, writing = _write_frames(staged, match, outputs, options.quiet)
-    seconds = {
-        "compile": compiling,
-        "simulate": run.seconds.simulate,
-        "lookup": run.seconds.lookup,
-        "write": writing,
-        "total": time.perf_counter() - began,
-    }
-    for output in scene.outputs:
-        if output.of == "report":
-            write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
-    return _verdict(staged, match, report)
+    match = _search(searched, options.quiet) if searched else None
+    if searched and match:
+        _save_match(match, scene, searched, options)
+    report = None
+    if scene.outputs:
+        report, run, writing = _write_frames(staged, match, outputs, options.quiet)
+        seconds = {
+            "compile": compiling,
+            "simulate": run.seconds.simulate,
+            "lookup": run.seconds.lookup,
+            "write": writing,
+            "total": time.perf_counter() - began,
+        }
+        for output in scene.outputs:
+            if output.of == "report":
+                write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
+    return _verdict(searched, match, report) if searched and match else Exit.DONE
 
 
 def _note(quiet: bool) -> Callable[[str], None]:
-    """What a user should know is a line on stderr."""
+    """A function that prints a note on stderr; prints nothing if quiet."""
 
     def note(text: str) -> None:
         if not quiet:
@@ -93,43 +95,42 @@ def _note(quiet: bool) -> Callable[[str], None]:
 
 
 def _morph_frames(staged: Staged) -> int | None:
-    """Frames of a morph, which may be shown there and back; None of an animation."""
-    return len(staged.settings.order) if staged.settings else None
+    """Frames of a morph, forwards and back; None for another scene."""
+    return len(staged.settings.order) if isinstance(staged, StagedMorph) else None
 
 
 def _with_sizes(scene: Scene, staged: Staged) -> Scene:
     """The scene with the sizes that its pixels refer to."""
     tables, picture = dict(scene.tables), staged.animation.picture
     tables["picture"] = {"size": [picture.width, picture.height], **tables["picture"]}
-    if staged.pair:
+    if isinstance(staged, StagedMorph):
         tables["morph"] = {"size": list(staged.pair.size), **tables["morph"]}
     return scene.with_tables(tables)
 
 
-def _say_plan(scene: Scene, staged: Staged) -> None:
-    """Print what a run would take and write."""
+def _print_plan(scene: Scene, staged: Staged) -> None:
+    """Print the size, the cost and the outputs of a run."""
     animation, morph_frames = staged.animation, _morph_frames(staged)
     timeline, grid, picture = animation.timeline, animation.grid, animation.picture
     guess = estimate(animation, kept_frames(scene), morph_frames)
     frames = morph_frames or animation.frame_count
-    fps = staged.settings.timeline.fps if staged.settings else timeline.fps
+    fps = staged.settings.timeline.fps if isinstance(staged, StagedMorph) else timeline.fps
     steps = (timeline.frames - 1) * timeline.steps_per_frame
     width, height = animation.width or picture.width, animation.height or picture.height
     names = ", ".join(str(scene.folder / output.file) for output in scene.outputs)
     print(f"picture   {picture.width} x {picture.height} pixels")
     print(f"grid      {grid.nx} x {grid.ny} cells")
-    print(f"steps     {steps} of {timeline.dt:.4g} s, {timeline.steps_per_frame} a frame")
-    print(f"frames    {frames} of {width} x {height} pixels at {fps:g} a second")
+    print(f"steps     {steps} of {timeline.dt:.4g} s, {timeline.steps_per_frame} per frame")
+    print(f"frames    {frames} of {width} x {height} pixels at {fps:g} per second")
     print(f"memory    about {readable_size(guess.memory)}")
-    print(f"time      about {guess.seconds:.1f} s on one core, without compiling and writing")
+    print(f"time      about {guess.seconds:.1f} s on one core, not counting compilation, search and writing")
     print(f"writes    {names or 'nothing'}")
-    if staged.aims:
-        points = len(staged.aims.keyframes)
-        print(f"search    {points} keyframes' forces first, for which time is not counted")
+    if isinstance(staged, StagedKeyframes):
+        print(f"search    for the forces of {len(staged.aims.keyframes)} keyframes")
 
 
 def _load_kernels(animation: Animation, quiet: bool) -> float:
-    """Load the kernels, with a message where that takes a compiler; returns the seconds it took."""
+    """Load the kernels, with a message if they are compiled; returns the seconds it took."""
     device = open_device(animation.device)
     new = not kernels_are_built(device)
     if new and not quiet:
@@ -140,12 +141,12 @@ def _load_kernels(animation: Animation, quiet: bool) -> float:
     return seconds
 
 
-def _find_forces(staged: Staged, quiet: bool) -> Match:
-    """Find the forces of keyframes, saying how far the search is; Ctrl-C ends it with the best so far."""
+def _search(staged: StagedKeyframes, quiet: bool) -> Match:
+    """Find the forces of keyframes and show progress; Ctrl-C ends the search with the best forces so far."""
     aims = staged.aims
     with HeldInterrupt() as interrupt, SearchProgress(aims.side, quiet) as show:
 
-        def heed(at: Progress) -> bool:
+        def advance(at: Progress) -> bool:
             show(at)
             return interrupt.wanted
 
@@ -156,19 +157,21 @@ def _find_forces(staged: Staged, quiet: bool) -> Match:
             start=aims.found,
             tolerance=aims.tolerance,
             seed=aims.seed,
-            progress=heed,
+            progress=advance,
             side=aims.side,
-            factors=FACTORS_OF_MORPH if staged.settings else None,
+            factors=FACTORS if isinstance(staged, StagedMorph) else None,
         )
         if interrupt.wanted:
             if not quiet:
-                print("\nstopped: writing the best so far; Ctrl-C again ends that too", file=sys.stderr)
+                print(
+                    "\nstopped: writing the best forces so far; press Ctrl-C again to quit", file=sys.stderr
+                )
             match = replace(match, status=STOPPED)
         return match
 
 
-def _keep_match(match: Match, scene: Scene, staged: Staged, options: RunOptions) -> None:
-    """Save the scene with the forces that were found, and plot the search, if wanted."""
+def _save_match(match: Match, scene: Scene, staged: StagedKeyframes, options: RunOptions) -> None:
+    """Save the scene with the forces found, and plot the search, where the options ask for it."""
     if options.save_scene:
         found = with_found(_with_sizes(scene, staged), match.found, staged.aims.side)
         write_scene(options.save_scene, found)
@@ -179,11 +182,12 @@ def _keep_match(match: Match, scene: Scene, staged: Staged, options: RunOptions)
 def _write_frames(
     staged: Staged, match: Match | None, outputs: list[Output], quiet: bool
 ) -> tuple[Report, Run, float]:
-    """Compute and write the frames; returns the report of them, their run, and the seconds of writing."""
+    """Compute and write the frames; returns their report, the run, and the seconds spent writing."""
     note = _note(quiet)
     animation = match.animation if match else staged.animation
-    morph = Morph(match, staged.pair, staged.settings) if match and staged.settings else None
-    report = Report(animation, match, staged.aims.side if staged.aims else 1.0, morph)
+    morph = Morph(match, staged.pair, staged.settings) if match and isinstance(staged, StagedMorph) else None
+    side = staged.aims.side if isinstance(staged, StagedKeyframes) else 1.0
+    report = Report(animation, match, side, morph)
     run = (morph or animation).frames()
     writing = write_frames(run, outputs, report, quiet)
     for text in morph.notes if morph else ():
@@ -193,10 +197,8 @@ def _write_frames(
     return report, run, writing
 
 
-def _verdict(staged: Staged, match: Match | None, report: Report | None = None) -> Exit:
-    """Whether points are where they should be, and the picture does not fold on their way."""
-    if match is None:
-        return Exit.DONE
+def _verdict(staged: StagedKeyframes, match: Match, report: Report | None) -> Exit:
+    """Whether all points reach their targets, and no frame of the picture folds."""
     least = min(match.jacobian[0], report.of_b[0] if report else math.inf)
     folds = judge_folds(least)
-    return judge_match(match, staged.aims.side, timed=staged.settings is None) or folds
+    return judge_match(match, staged.aims.side, timed=not isinstance(staged, StagedMorph)) or folds

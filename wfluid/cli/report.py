@@ -13,9 +13,10 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
+from wfluid.domain.walls import Walls
 from wfluid.keyframes.match import Match
 from wfluid.model.force import Force, flatten
-from wfluid.model.painted import Keyed, Painted, Quantity
+from wfluid.model.painted import Keyed, Painted
 from wfluid.morphing.frame import MorphFrame
 from wfluid.morphing.morph import Morph
 from wfluid.solve.system import Residual
@@ -24,18 +25,18 @@ from wfluid.system.atomic import atomic_write_text
 
 @dataclass
 class Report:
-    """Collects what the frames of an animation say of themselves."""
+    """Measures of a run, collected frame by frame."""
 
     animation: Animation
-    """What is run."""
+    """The animation that runs."""
     match: Match | None = None
-    """What the search for its keyframes came to."""
+    """The result of the search for its keyframes."""
     side: float = 1.0
-    """The longer side in the pixels that keyframes are given in."""
+    """The longer side in the scene's pixels."""
     morph: Morph | None = None
-    """The morph that the animation is the flow of."""
+    """The morph, whose flow the animation is."""
     frames: int = 0
-    """Frames seen."""
+    """Frames so far."""
     extremes: dict[str, float] = field(
         default_factory=lambda: {
             "divergence_max": 0.0,
@@ -50,13 +51,12 @@ class Report:
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
     solves: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Of projection and diffusion: the methods used, most iterations and largest residuals seen."""
-
+    """Methods, most iterations and largest residuals of projection and diffusion."""
     of_b: list[float] = field(default_factory=lambda: [math.inf, -math.inf])
-    """Least and greatest det J of the map of a morph's second picture."""
+    """Smallest and largest det J of the map into a morph's second picture."""
 
     def add(self, frame: Frame) -> None:
-        """Take a frame's figures."""
+        """Add the measures of a frame."""
         side = max(self.animation.picture.width, self.animation.picture.height)
         seen, quality = self.extremes, frame.quality
         self.frames += 1
@@ -71,7 +71,7 @@ class Report:
             ("divergence_removed_max", abs(frame.solve.removed) if frame.solve else 0.0),
         ):
             seen[name] = max(seen[name], value)
-        if isinstance(frame, MorphFrame):
+        if isinstance(frame, MorphFrame) and frame.to_quality:
             self.of_b[0] = min(self.of_b[0], frame.to_quality.jacobian_min)
             self.of_b[1] = max(self.of_b[1], frame.to_quality.jacobian_max)
         if frame.solve:
@@ -115,7 +115,7 @@ class Report:
         }
 
     def _keyframes(self) -> dict[str, Any]:
-        """What the search for keyframes came to; a residual is the larger of the particle's and the map's."""
+        """The result of the search; a residual is the larger of the particle's and the map's."""
         match, side = self.match, self.side
         if match is None:
             return {}
@@ -151,7 +151,7 @@ class Report:
         }
 
     def _morph(self) -> dict[str, Any]:
-        """How well a morph's two pictures meet."""
+        """The measures of a morph."""
         morph = self.morph
         if morph is None:
             return {}
@@ -163,11 +163,11 @@ class Report:
                 "to": list(morph.pair.size),
                 "window": [window.x, window.y, window.width, window.height],
                 "residual_px": {
-                    "first": [arrival.residual * self.side for arrival in self.match.arrivals],
+                    "first": [arrival.residual * self.side for arrival in morph.match.arrivals],
                     "second": residuals,
                 },
                 "residual_max_px": {
-                    "first": self.match.residual * self.side,
+                    "first": morph.match.residual * self.side,
                     "second": max(residuals),
                 },
                 "jacobian": {
@@ -181,8 +181,9 @@ class Report:
         }
 
     def as_dict(self, seconds: Mapping[str, float], seam: Seam | None = None) -> dict[str, Any]:
-        """The report, with the times of the whole command [s], and the seam of a loop."""
+        """The report; `seconds` are the times of the command [s], `seam` is that of a loop."""
         animation, fluid = self.animation, self.animation.fluid
+        walls = Walls.parse(fluid.walls)
         return {
             "picture": [animation.picture.width, animation.picture.height],
             "grid": [animation.grid.nx, animation.grid.ny],
@@ -193,7 +194,7 @@ class Report:
                 "viscosity": _described(fluid.viscosity),
                 "viscosity_moves": fluid.viscosity_moves,
                 "freeze": fluid.freeze.strength if fluid.freeze else None,
-                "walls": [fluid.walls.x.value, fluid.walls.y.value],
+                "walls": [walls.x.value, walls.y.value],
                 "scheme": fluid.scheme,
                 "solver": fluid.solver,
                 "substeps": animation.timeline.steps_per_frame,
@@ -217,19 +218,19 @@ class Report:
 
 
 def _area(extremes: Mapping[str, float]) -> str:
-    """Whether areas should be preserved: the range of det J says how well they are."""
+    """Whether the flow should preserve areas; the range of det J shows how well it does."""
     if extremes["divergence_prescribed_max"] > 0:
-        return "not preserved: sources of divergence make places grow or shrink"
-    return "preserved, but for what det J shows"
+        return "not preserved: some forces grow or shrink parts of the picture"
+    return "preserved, up to the errors that det J shows"
 
 
-def _described(viscosity: Quantity) -> float | list[float] | str:
-    """A number; the least and the greatest of a painting; or what else it is."""
+def _described(viscosity: object) -> float | list[float] | str:
+    """A number; the smallest and largest value of a picture; or a word for another kind."""
     if isinstance(viscosity, Painted):
         return [float(viscosity.values.min()), float(viscosity.values.max())]
-    return (
-        viscosity if isinstance(viscosity, float) else "keyed" if isinstance(viscosity, Keyed) else "of time"
-    )
+    if isinstance(viscosity, float):
+        return viscosity
+    return "keyed" if isinstance(viscosity, Keyed) else "of time"
 
 
 def _kind(force: Force) -> str:
@@ -253,7 +254,7 @@ def versions() -> dict[str, str]:
 
 
 def write_report(path: str | os.PathLike, report: Mapping[str, Any]) -> None:
-    """Write a report as JSON, whole or not at all.
+    """Write a report as JSON; on an error no file is left behind.
 
     Raises:
         FileError: the file cannot be written.

@@ -1,4 +1,4 @@
-"""The flags of whatever runs."""
+"""Flags that several commands share."""
 
 from __future__ import annotations
 
@@ -7,25 +7,31 @@ from typing import Any
 
 
 def add_run(parser: argparse.ArgumentParser) -> None:
-    """The flags of whatever runs a scene."""
-    parser.add_argument("--preview", metavar="FILE", help="draw the controls on the picture and stop")
-    parser.add_argument("--dry-run", action="store_true", help="say what would be done, and stop")
-    parser.add_argument("--report", metavar="FILE.json", help="write settings, times and quality figures")
+    """Add the flags of commands that run a scene."""
+    parser.add_argument(
+        "--preview", metavar="FILE", help="draw the controls on the picture, write it to FILE, and stop"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="print what would be computed and written, and stop"
+    )
+    parser.add_argument(
+        "--report", metavar="FILE.json", help="write settings, times and quality measures as JSON"
+    )
     add_device(parser)
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """The figure of a search."""
-    text = "draw arrows, ways, deformed grid and convergence of keyframes"
+    """Add the flag for a figure of a search."""
+    text = "draw keyframes, paths, deformed grid and convergence of the search"
     parser.add_argument("--plot", metavar="FILE.png", help=text)
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
-    """Where it runs."""
-    parser.add_argument("--device", default=None, help="cpu (default), cuda, cuda:1, …")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    """Add the flags for device and progress."""
+    parser.add_argument("--device", default=None, help="cpu, cuda, cuda:1, … (cpu)")
+    parser.add_argument("--quiet", action="store_true", help="print no progress and no notes on stderr")
 
 
 def repeated(metavar: str, text: str) -> dict[str, Any]:
-    """Settings of a flag that may be given several times."""
+    """Arguments of `add_argument` for a repeatable flag."""
     return {"metavar": metavar, "action": "append", "default": [], "help": f"{text}; repeatable"}

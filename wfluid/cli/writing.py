@@ -1,4 +1,4 @@
-"""Frames written in a second thread while the next are computed."""
+"""Frames written by a second thread while the next are computed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.run import QUEUED_FRAMES, Run
 from wfluid.cli.progress import FrameProgress
 from wfluid.cli.report import Report
-from wfluid.files.output import open_output, output_notes
+from wfluid.files.output import FrameWriter, open_output, output_notes
 from wfluid.files.tracks import TrackWriter
 from wfluid.pictures.color import linear_color
 from wfluid.pictures.formats import Encoding
@@ -36,32 +36,31 @@ class _Writer(Protocol):
 
 
 Output = tuple[_Writer, Callable[[Frame], None]]
-"""What writes an output, and how it takes a frame."""
+"""The writer of an output, and the function that gives it a frame."""
 
 
 def kept_frames(scene: Scene) -> int:
-    """How many outputs hold every frame until the last."""
+    """Number of outputs that keep every frame in memory until the last."""
     return sum(Path(output.file).suffix.lower() == ".gif" for output in scene.outputs)
 
 
 def open_writers(scene: Scene, animation: Animation) -> list[Output]:
-    """What writes each output of a scene.
+    """The writers of a scene's outputs.
 
     Raises:
-        FileError: a name that tells no format, or a folder that cannot be written.
+        FileError: an ending of no known format, or a folder that cannot be written.
     """
-    found = []
+    found: list[Output] = []
     width, height = scene.picture.size or (animation.picture.width, animation.picture.height)
     for output in scene.outputs:
         if output.of == "report":
             continue
         path = scene.folder / output.file
         if output.of == "tracks":
-            tracks = TrackWriter(path, max(width, height))
-            found.append((tracks, lambda frame, tracks=tracks: tracks.write(frame.time, frame.points)))
+            found.append(_track_output(path, max(width, height)))
             continue
         writer = open_output(path, scene.timeline.fps, output.start, _encoding(scene, output))
-        found.append((writer, lambda frame, w=writer, of=output.of: w.write(_shown(frame, of))))
+        found.append(_picture_output(writer, output.of))
     return found
 
 
@@ -85,8 +84,17 @@ def _encoding(scene: Scene, output: OutputTable) -> Encoding:
     return replace(output.encoding, background=None if background is None else linear_color(background))
 
 
+def _track_output(path: Path, side: float) -> Output:
+    writer = TrackWriter(path, side)
+    return writer, lambda frame: writer.write(frame.time, frame.points)
+
+
+def _picture_output(writer: FrameWriter, of: str) -> Output:
+    return writer, lambda frame: writer.write(_shown(frame, of))
+
+
 def _shown(frame: Frame, of: str) -> Picture:
-    """The picture of a frame that an output is of; a density is shown as its numbers."""
+    """The picture, the layer or the density of a frame, by the name that an output has in `of`."""
     if of == "picture":
         return frame.picture
     if of in frame.layers:
@@ -134,7 +142,7 @@ def write_frames(
         return writing + time.perf_counter() - start
     except KeyboardInterrupt:
         for writer, _ in writers:
-            writer.close()  # what is there is whole: a movie ends at its last frame
+            writer.close()  # keep the frames so far: a movie ends at its last frame
         print(f"interrupted; finished: {_finished(writers)}", file=sys.stderr)
         raise
     except BaseException:
@@ -144,7 +152,7 @@ def write_frames(
 
 
 def _finished(writers: Sequence[Output]) -> str:
-    """The files that are whole, of a sequence the first and the last."""
+    """The complete files; of a sequence the first and the last."""
     found = []
     for writer, _ in writers:
         ends = [str(path) for path in writer.written[:1] + writer.written[1:][-1:]]

@@ -106,8 +106,8 @@ def vector(layout: Layout, device: wp.Device, components: int) -> Vector:
     return tuple(field(layout, device) for _ in range(components))
 
 
-def where(grid: Grid, walls: Walls, layout: Layout) -> list[int]:
-    """Arguments of programs that interpolate: nx, ny, periodic_x, periodic_y (1 or 0), pitch."""
+def lookup_args(grid: Grid, walls: Walls, layout: Layout) -> list[int]:
+    """Arguments of the kernels that interpolate: nx, ny, whether each axis is periodic, and the pitch."""
     periodic_x, periodic_y = walls.periodic
     return [grid.nx, grid.ny, int(periodic_x), int(periodic_y), layout.pitch]
 

@@ -78,7 +78,7 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def _separator_of(line: str) -> str:
-    """The separator of a line's fields: the one that gives 4 or 5 fields, else the one that gives most."""
+    """The separator of a line's fields: the one with 4 or 5 fields, else the one with most fields."""
     counts = {separator: len(_split(line, separator)) for separator in _SEPARATORS}
     return next((one for one in counts if counts[one] in (4, 5)), max(counts, key=counts.get))
 

@@ -1,9 +1,10 @@
-"""Which steps are taken, kept and gone back through, when there is no room to keep all: a list of actions.
+"""Checkpoints: the schedule of a forward and backward pass with limited memory, as a list of actions.
 
-Even segments: the state at the beginning of each is stored; going backward, a segment's steps are taken
-again, this time all kept, and reversed. With room for about 2 sqrt(steps) states every step but those
-of the last segment is taken twice, never more often (A. Griewank, A. Walther, Evaluating Derivatives,
-2nd ed., section 12.3). What is done does not depend on the room, only how often.
+The run is cut into even segments, and the state at the beginning of each is stored as a checkpoint. In the
+backward pass the steps of a segment are taken again from its checkpoint, with all their states stored, and
+then reversed. With room for about 2 sqrt(steps) states every step is taken at most twice, those of the last
+segment once (A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., section 12.3). The results have the
+same bits for any schedule.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Advance:
-    """Take the steps from `start` to `end`, keeping every state between; the state at `start` is there."""
+    """Take the steps from `start` to `end` from the current state, and store every state between."""
 
     start: int
     end: int
@@ -23,21 +24,21 @@ class Advance:
 
 @dataclass(frozen=True)
 class Store:
-    """Store the state at `step`, the last one taken to, and begin the next segment with it."""
+    """Store the current state, at `step`, as the checkpoint of the segment that begins there."""
 
     step: int
 
 
 @dataclass(frozen=True)
 class Restore:
-    """Begin with the state stored at `step`."""
+    """Make the checkpoint at `step` the current state."""
 
     step: int
 
 
 @dataclass(frozen=True)
 class Reverse:
-    """Go back from `end` to `start`, whose states between are all kept."""
+    """The backward pass from `end` to `start`, between which all states are stored."""
 
     start: int
     end: int
@@ -48,22 +49,22 @@ Action = Advance | Store | Restore | Reverse
 
 @dataclass(frozen=True)
 class Schedule:
-    """Segments of a run, and what is done with them."""
+    """The segments of a run, and the actions of both passes."""
 
     segments: tuple[tuple[int, int], ...]
-    """First step and end of each."""
+    """First step and end of each segment."""
     keeps_all: bool
-    """Whether there is room for every state, so that none need be stored or computed again."""
+    """Whether all states are stored, so that no checkpoints are needed and no step is taken again."""
 
     @property
     def room(self) -> int:
-        """States that it keeps or stores."""
+        """Number of states that are stored at once, checkpoints included."""
         if self.keeps_all:
             return self.segments[-1][1] + 1
         return max(end - start for start, end in self.segments) + 1 + len(self.segments)
 
     def forward(self) -> list[Action]:
-        """What leads from the beginning to the end."""
+        """The actions of the forward pass."""
         actions: list[Action] = []
         for start, end in self.segments:
             if not self.keeps_all:
@@ -72,7 +73,7 @@ class Schedule:
         return actions
 
     def backward(self) -> list[Action]:
-        """What leads back, once `forward` has been done."""
+        """The actions of the backward pass, after those of `forward`."""
         actions: list[Action] = []
         for n, (start, end) in enumerate(reversed(self.segments)):
             if n and not self.keeps_all:
@@ -82,12 +83,12 @@ class Schedule:
 
 
 def even_segments(steps: int, room: int | None = None, breaks: Iterable[int] = ()) -> Schedule:
-    """The longest even segments of so many steps for which there is room, cut at `breaks` too.
+    """The schedule with the longest even segments that fit in `room` states; every break ends a segment.
 
-    `room` counts states; by default there is enough for all.
+    By default there is room for all states.
 
     Raises:
-        ValueError: not even the shortest fit, with the least that does.
+        ValueError: too little room for any schedule, with the least that works.
     """
     breaks = set(breaks)
     cuts = sorted({0, steps, *breaks})
@@ -102,19 +103,19 @@ def even_segments(steps: int, room: int | None = None, breaks: Iterable[int] = (
 
 
 def least_room(steps: int, breaks: Iterable[int] = ()) -> int:
-    """States that the least demanding schedule keeps or stores."""
+    """Least number of states with which a schedule works."""
     cuts = sorted({0, steps, *breaks})
     return min(steps + 1, *(_room(cuts, length) for length in range(1, steps + 1)))
 
 
 def _room(cuts: list[int], length: int) -> int:
-    """States that segments of at most so many steps, between the cuts, keep and store."""
+    """Number of states stored at once with segments of at most `length` steps between the cuts."""
     counts = [-(-(b - a) // length) for a, b in pairwise(cuts)]
     longest = max(-(-(b - a) // count) for (a, b), count in zip(pairwise(cuts), counts, strict=True))
     return longest + 1 + sum(counts)
 
 
 def _evenly(start: int, end: int, length: int) -> list[tuple[int, int]]:
-    """The fewest segments of at most `length` steps, as even as can be."""
+    """The fewest segments of at most `length` steps, of sizes that differ by 1 at most."""
     count = -(-(end - start) // length)
     return list(pairwise(start + (end - start) * n // count for n in range(count + 1)))

@@ -1,4 +1,4 @@
-"""An objective as a function of the numbers that are free, with its exact gradient: all an optimiser sees.
+"""An objective as a function of the free numbers, with its gradient: the interface to an optimiser.
 
 >>> from wfluid import Constant, Effort, Fluid, Free, GaussianForce, Grid, ParticleMisfit, Timeline
 >>> forces = [GaussianForce((0.4, 0.5), (1.0, 0.0), 0.1, Constant(0, 0.25))]
@@ -11,11 +11,17 @@
 >>> bool(gradient[0] < 0)  # a stronger push to the right brings the point nearer
 True
 
-The gradient is that of the very numbers the simulation computes, discretisation, walls and all, by the
-adjoint method (Bonilla & Velho, section III): whatever the number of free numbers, it costs about two
-more runs. It is right to rounding where solves are cycles or sweeps, which are their own transposes. Where
-viscosity or drag jump they are conjugate gradients, which are so up to a tolerance (`JUMP_TOLERANCE`, for
-which a fluid's own is lowered here); and with respect to viscosity it is right up to the diffusion's.
+An evaluation has two passes. The forward pass sets the free numbers, runs the simulation in a captured loop
+of steps, stores the state after each step, and measures the objective. The backward pass runs the transposes
+of the steps from the last to the first (the adjoint method; Bonilla & Velho, section III); it computes again
+what they read besides the stored states, but no solve unless viscosity is free or moves. If `memory_mb`
+leaves no room for all states, only some are stored as checkpoints, from which steps are taken again.
+
+So the gradient is that of the discretised simulation, walls included, and costs about two more runs for any
+number of free numbers. It is exact to rounding where the solves are cycles or sweeps, which are their own
+transposes. Where viscosity or drag jump, the solves are conjugate gradients, which are their own transposes
+up to their tolerance; it is lowered here to `JUMP_TOLERANCE`. With respect to viscosity the gradient is as
+accurate as the diffusion's solve.
 """
 
 from __future__ import annotations
@@ -34,7 +40,7 @@ from wfluid.gradient.graph_cache import GraphCache
 from wfluid.gradient.objectives import Effort, Objective, ParticleObjective, points_of, terms_of, times_of
 from wfluid.gradient.recording import Recording, RunGradients, StepRange
 from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
-from wfluid.gradient.variables import VELOCITY, VISCOSITY, Free, Setup, Variables
+from wfluid.gradient.variables import VELOCITY, VISCOSITY, Address, Free, Setup, Variables, address_of
 from wfluid.kernels.cell.real import Real
 from wfluid.model.densities import Source
 from wfluid.model.fluid import Fluid
@@ -44,11 +50,10 @@ from wfluid.step.gaussians import gaussian_impulse_of
 from wfluid.step.step import Step
 
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
-"""Largest relative residual that conjugate gradients may leave."""
-
+"""Largest tolerance of conjugate gradients, a relative residual."""
 
 ROUNDING = 1e-6
-"""How far outside the picture rounding may leave a point on its edge [longer side]."""
+"""Distance outside the picture that counts as rounding, for a point on its edge [longer side]."""
 
 
 @dataclass
@@ -56,9 +61,9 @@ class EvaluationTimes:
     """Time spent on evaluations [s]."""
 
     forward: float = 0.0
-    """Simulations."""
+    """Of forward passes."""
     backward: float = 0.0
-    """Their adjoints."""
+    """Of backward passes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,19 +75,19 @@ class Evaluation:
     gradient: np.ndarray
     """Its gradient, of the vector's length."""
     places: Mapping[float, np.ndarray]
-    """Positions of all the objective's particles [longer side], (n, 2), by the times it looks at them [s]."""
+    """Positions of all particles [longer side], (n, 2), by the objective's times [s]."""
 
 
 class Functional:
     """An objective of a run, as a function of the run's free numbers.
 
-    Making one loads the kernels; the first evaluation captures graphs, which later ones replay. It is for one
-    thread at a time.
+    The constructor loads the kernels and captures graphs, which evaluations replay. One thread at a time may
+    use it.
 
     Raises:
-        ValueError: nothing free, or a name that cannot be; an objective's time outside the run or between two
-            steps; a cap on memory too small; a velocity that does not fit the grid; a free viscosity, or
-            one that moves, whose diffusion is not solved well enough.
+        ValueError: nothing free, or a name that cannot vary; an objective's time outside the run or between
+            two steps; a memory cap too small; a velocity that does not fit the grid; a diffusion whose
+            tolerance is too large for the gradient with respect to a viscosity that is free or moves.
     """
 
     def __init__(
@@ -102,18 +107,18 @@ class Functional:
         graphs: GraphCache | None = None,
         room: float = 0.0,
     ):
-        """`velocity` (2, ny, nx) is that at the beginning, as in `Setup`; rest by default.
+        """`velocity` (2, ny, nx) is the velocity at the beginning, as in `Setup`; 0 by default.
 
-        With `begin`, a time [s] and the fluid at that time (`state_after`), the run goes on from there; the
-        objective's points are then places at that time. It ends with the timeline, or at the time `end`.
+        With `begin`, a time [s] and the fluid at that time (`state_after`), the run starts there; the
+        objective's points are then positions at that time. It ends with the timeline, or at the time `end`.
 
         `memory_mb` caps the memory for stored states, by far the largest part. If the states exceed it, most
         steps are computed twice.
 
-        `graphs` reuses captured graphs of an earlier functional that was given the same cache, if grid,
-        timeline, fluid, kinds of forces and number of particles are the same and both or neither count
-        effort; the earlier one cannot be evaluated afterwards. `room` [s] reserves tables for runs up to that
-        length, so that later functionals of longer runs can reuse the graphs too.
+        `graphs` is a cache: this functional reuses the graphs of an earlier one with the same cache, grid,
+        timeline, fluid, types of forces and number of particles, if both or neither have effort. The earlier
+        one cannot be evaluated afterwards. `room` [s] reserves tables for runs up to that length, so that
+        later functionals of longer runs can reuse the graphs too.
         """
         shape = (2, grid.ny, grid.nx)
         velocity = np.zeros(shape) if velocity is None else np.array(velocity, dtype=np.float64)
@@ -124,7 +129,7 @@ class Functional:
         self.variables = Variables(setup, free, grid)
         self.start = self.variables.pack()
         self.start.setflags(write=False)
-        of_viscosity = self.variables.has(VISCOSITY)
+        of_viscosity = self.variables.has(address_of(VISCOSITY))
         _check_solves(fluid, of_viscosity)
         if memory_mb is not None and not (np.isfinite(memory_mb) and memory_mb > 0):
             raise ValueError(f"memory_mb {memory_mb}: expected a positive number of megabytes")
@@ -140,36 +145,37 @@ class Functional:
             self._first = self._step_of(start, "a beginning")
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
-        before = graphs.find(grid, timeline, fluid) if graphs else None
-        step = before.step if before else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
+        cached = graphs.find(grid, timeline, fluid) if graphs else None
+        step = cached.step if cached else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[DeviceObjective]] = {}
-        # graphs count effort with weight 1, and so suit all weights: the others are relative to it
+        # in the graphs effort has weight 1, so that they can be reused: other weights are relative to it
         self._scale = sum(weight for weight, term in terms_of(objective) if isinstance(term, Effort))
         effort, self._scale, count = bool(self._scale), self._scale or 1.0, 0
         for weight, term in terms_of(objective):
-            own = slice(count, count + len(points_of(term)))
-            count, weight = own.stop, weight / self._scale
+            particles = slice(count, count + len(points_of(term)))
+            count, weight = particles.stop, weight / self._scale
             steps = [self._step_of(t) for t in times_of(term)]
             if isinstance(term, ParticleObjective):
-                self._particles.append((weight, term, own))
+                self._particles.append((weight, term, particles))
             elif isinstance(term, StateObjective):
-                terms.setdefault(steps[0], []).append(term.term(step, weight, own))
+                terms.setdefault(steps[0], []).append(term.term(step, weight, particles))
             elif not isinstance(term, Effort):
-                raise TypeError(f"{type(term).__name__} is no objective that a run has")
+                raise TypeError(f"{type(term).__name__} is no objective of a run")
         points = np.concatenate([np.empty((0, 2)), *(points_of(term) for _, term in terms_of(objective))])
         inside = np.clip(points, 0.0, (grid.width, grid.height))
         if not np.all(np.abs(points - inside) <= ROUNDING):
             raise ValueError("an objective's particles must begin within the picture")
-        self._looked_at = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
-        stretch = StepRange(self._first, self._last, begun, inside)
-        if before and not (terms or of_viscosity or memory_mb) and before.suits(setup, stretch, effort):
-            before.moved(setup, stretch)
-            self._recording = before
+        self._observed = sorted({self._step_of(t) for _, term, _ in self._particles for t in term.times})
+        step_range = StepRange(self._first, self._last, begun, inside)
+        reusable = cached and not (terms or of_viscosity or memory_mb)
+        if cached and reusable and cached.suits(setup, step_range, effort):
+            cached.moved(setup, step_range)
+            self._recording = cached
         else:
-            steps = round(room / timeline.dt)
+            rows = round(room / timeline.dt)
             self._recording = Recording(
-                step, setup, timeline, stretch, terms, memory_mb, of_viscosity, effort, steps
+                step, setup, timeline, step_range, terms, memory_mb, of_viscosity, effort, rows
             )
         self._graphs = graphs
         if graphs:
@@ -177,7 +183,7 @@ class Functional:
         self.evaluations, self.seconds = 0, EvaluationTimes()
 
     start: np.ndarray
-    """The free numbers of the fluid and forces given, as a vector."""
+    """The vector for the fluid, forces and velocity given to the constructor."""
     evaluations: int
     """Number of evaluations so far."""
     seconds: EvaluationTimes
@@ -189,7 +195,7 @@ class Functional:
         return self._recording.memory
 
     def setup(self, m: np.ndarray) -> Setup:
-        """Fluid, forces and velocity with the free numbers of a vector.
+        """Fluid, forces and velocity for a vector.
 
         Raises:
             ValueError: a vector of another length, with numbers that are not finite, or out of range.
@@ -200,13 +206,13 @@ class Functional:
         """The objective at m.
 
         Raises:
-            ValueError: as `setup`, or a force that would add more than the limit.
-            FloatingPointError: the run does not stay finite; the message names the first bad step.
+            ValueError: as `setup`, or a force that would add more velocity than the limit.
+            FloatingPointError: the run does not stay finite; the message names the first such step.
         """
         return self._forward(m)[0]
 
     def state_after(self, m: np.ndarray) -> State:
-        """The fluid at the end of the run with the vector m.
+        """The fluid at the end of the run for the vector m.
 
         Raises:
             ValueError: as `value`.
@@ -230,24 +236,26 @@ class Functional:
 
         Raises:
             ValueError: as `value`.
-            FloatingPointError: the run or the gradient is not finite; with the step where that begins.
+            FloatingPointError: the run or the gradient is not finite; the message names the step where that
+                begins.
         """
-        value, pulls, places = self._forward(m)
+        value, particle_bars, places = self._forward(m)
         began = time.perf_counter()
-        found = self._recording.backward(pulls)
+        found = self._recording.backward(particle_bars)
         m = np.asarray(m, dtype=np.float64)
         gradient = self._scale * self.variables.pull_back(self._gradients(found), m)
         if not np.all(np.isfinite(gradient)):
-            self._recording.forward()  # with little memory the backward pass has overwritten the end
-            self._recording.backward(pulls, watch=self._refuse)
+            self._recording.forward()  # with checkpoints, the backward pass has overwritten the tables
+            self._recording.backward(particle_bars, watch=self._refuse)
             slices = self.variables.slices
-            wrong = [one.name for one in slices if not np.all(np.isfinite(gradient[one.entries]))]
+            wrong = [part.name for part in slices if not np.all(np.isfinite(gradient[part.entries]))]
             raise FloatingPointError(f"the gradient with respect to {', '.join(wrong)} is not finite")
         self.seconds.backward += time.perf_counter() - began
         return Evaluation(value, gradient, places)
 
     def _forward(self, m: np.ndarray) -> tuple[float, dict[int, np.ndarray], dict[float, np.ndarray]]:
-        """The value, the gradients with respect to particles' positions by step, those positions by time.
+        """The forward pass: the value, the gradients with respect to particles' positions by step, and those
+        positions by time.
 
         Raises:
             RuntimeError: a later functional has taken over the graphs of this one.
@@ -258,59 +266,65 @@ class Functional:
         began, recording = time.perf_counter(), self._recording
         self._setup = self.variables.unpack(m)
         recording.set(self._setup)
-        places = recording.forward(self._looked_at)
-        value, pulls, at_times = recording.value, {}, {}
-        for weight, term, own in self._particles:
+        value, positions = recording.forward(self._observed)
+        particle_bars: dict[int, np.ndarray] = {}
+        at_times = {}
+        for weight, term, particles in self._particles:
             for t in term.times:
                 step = self._step_of(t)
-                at_times[t] = places[step]
-                part, slope = term.at(t, places[step][own])
+                at_times[t] = positions[step]
+                part, slope = term.at(t, positions[step][particles])
                 value += weight * part
-                pulls.setdefault(step, np.zeros_like(places[step]))[own] += weight * slope
+                bar = particle_bars.setdefault(step, np.zeros_like(positions[step]))
+                bar[particles] += weight * slope
         if not (np.isfinite(value) and recording.finite):
-            step = recording.first_step_not_finite()
+            bad = recording.first_step_not_finite()
             raise FloatingPointError(
                 "the objective is not finite"
-                if step is None
-                else f"the fluid is not finite from step {step} ({recording.time_of(step):.4g} s) on: "
+                if bad is None
+                else f"the fluid is not finite from step {bad} ({recording.time_of(bad):.4g} s) on: "
                 "smaller forces or steps help"
             )
         self.seconds.forward += time.perf_counter() - began
-        return value * self._scale, pulls, at_times
+        return value * self._scale, particle_bars, at_times
 
     def _refuse(self, step: int, bar: State) -> None:
+        """Raise if the gradient with respect to the state before a step is not finite."""
         if not bar.finite:
             t = self._recording.time_of(step)
             raise FloatingPointError(f"the gradient is not finite from step {step} ({t:.4g} s) backward")
 
-    def _gradients(self, found: RunGradients) -> dict[str, np.ndarray]:
-        """Gradients by name."""
-        gradients = {VELOCITY: found.velocity, VISCOSITY: found.viscosity}
+    def _gradients(self, found: RunGradients) -> dict[Address, np.ndarray]:
+        """The gradients with respect to the numbers of a setup, by address."""
+        mu_bar = found.viscosity
         if isinstance(self._setup.fluid.viscosity, float):
-            gradients[VISCOSITY] = np.asarray(found.viscosity.sum())
-        self._add_slopes(gradients, "forces", self._setup.forces, found.forces)
+            mu_bar = np.asarray(mu_bar.sum())
+        gradients = {address_of(VELOCITY): found.velocity, address_of(VISCOSITY): mu_bar}
+        self._add_slopes(gradients, ("forces",), self._setup.forces, found.forces)
         for d, density in enumerate(self._setup.fluid.densities):
-            self._add_slopes(gradients, f"fluid.densities[{d}].sources", density.sources, found.sources[d])
+            sources: Address = ("fluid", "densities", d, "sources")
+            self._add_slopes(gradients, sources, density.sources, found.sources[d])
         return gradients
 
     def _add_slopes(
-        self, gradients: dict, where: str, forces: Sequence, found: Mapping[int, np.ndarray]
+        self, gradients: dict, parent: Address, forces: Sequence, found: Mapping[int, np.ndarray]
     ) -> None:
-        """Sum the gradients of each force's numbers over the steps."""
+        """Add the gradients of the numbers of forces at the address `parent`, summed over the steps."""
         for n, force in enumerate(forces):
-            name = f"{where}[{n}]"
-            if not self.variables.has(name):
+            address = (*parent, n)
+            if not self.variables.has(address):
                 continue
             for step, row in enumerate(found[n]):
                 start, end = self._recording.time_of(step), self._recording.time_of(step + 1)
                 if not np.any(row):
                     continue
                 bar = gaussian_impulse_of(row) if isinstance(force, LocalForce | Source) else row
-                for key, slope in force.pull_back(start, end, bar).items():
-                    gradients[f"{name}.{key}"] = gradients.get(f"{name}.{key}", 0.0) + slope
+                for name, slope in force.pull_back(start, end, bar).items():
+                    number = (*address, *address_of(name))
+                    gradients[number] = gradients.get(number, 0.0) + slope
 
     def _step_of(self, t: float, what: str = "an objective") -> int:
-        """The number of steps from the run's beginning to a time.
+        """Number of steps from the run's beginning to a time.
 
         Raises:
             ValueError: outside the run, or between two steps.
@@ -330,7 +344,7 @@ class Functional:
 
 
 def _check_solves(fluid: Fluid, free: bool) -> None:
-    """Refuse gradients with respect to a viscosity whose diffusion is not solved well enough."""
+    """Refuse gradients with respect to viscosity if the diffusion's tolerance is too large for them."""
     what = "a free viscosity" if free else "a viscosity that moves"
     if not (free or fluid.viscosity_moves):
         return

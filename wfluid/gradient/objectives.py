@@ -1,11 +1,11 @@
-"""What is to be made small: misfits of particles, of the map, of densities; effort; sums; a user's own.
+"""Objectives to minimise: misfits of particles, of the map, of densities; effort; sums; user-defined ones.
 
 >>> objective = ParticleMisfit([(0.4, 0.5)], [(0.6, 0.5)], time=1.0) + 1e-4 * Effort()
 >>> [weight for weight, _ in objective.terms]
 [1.0, 0.0001]
 
-Each is a frozen description; `functional` brings it to the device. Misfits are halves of weighted squares:
-their gradients are the weighted misfits themselves.
+An objective here is a description only; `functional` evaluates it. A misfit is half a weighted sum of
+squares, so its gradient is the weighted residual.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from wfluid.domain.paths import Place
 
 
 class Objective:
-    """A number that a run has. Objectives add and are multiplied by numbers."""
+    """A number computed from a run. Objectives can be added, and multiplied by numbers."""
 
     def __add__(self, other: Objective) -> Sum:
         return Sum((*terms_of(self), *terms_of(other)))
 
-    def __mul__(self, weight: float) -> Sum:
-        return Sum(tuple((weight * own, term) for own, term in terms_of(self)))
+    def __mul__(self, factor: float) -> Sum:
+        return Sum(tuple((factor * weight, term) for weight, term in terms_of(self)))
 
     __rmul__ = __mul__
 
@@ -47,17 +47,17 @@ class Objective:
 
 @dataclass(frozen=True)
 class Sum(Objective):
-    """Objectives, each times its weight.
+    """A weighted sum of objectives.
 
     Raises:
         ValueError: a weight that is not finite.
     """
 
     terms: tuple[tuple[float, Objective], ...]
-    """Weight and objective of each."""
+    """Weight and objective of each term."""
 
     def __post_init__(self) -> None:
-        parts = [(weight * own, term) for weight, whole in self.terms for own, term in terms_of(whole)]
+        parts = [(factor * weight, term) for factor, sum_ in self.terms for weight, term in terms_of(sum_)]
         object.__setattr__(self, "terms", tuple(parts))
         for weight, _ in self.terms:
             if not math.isfinite(weight):
@@ -65,46 +65,52 @@ class Sum(Objective):
 
 
 def points_of(objective: Objective) -> np.ndarray:
-    """Where the particles begin that an objective looks at [longer side], (n, 2)."""
+    """Positions at the beginning of an objective's particles [longer side], (n, 2)."""
     return getattr(objective, "points", np.empty((0, 2)))
 
 
 def times_of(objective: Objective) -> tuple[float, ...]:
-    """When an objective looks at the run [s]; none for one of the whole run."""
+    """The times at which an objective reads the state [s]; none for one of all steps."""
     return getattr(objective, "times", ())
 
 
 def terms_of(objective: Objective) -> tuple[tuple[float, Objective], ...]:
-    """The parts of an objective with their weights."""
+    """The terms of an objective with their weights."""
     return objective.terms if isinstance(objective, Sum) else ((1.0, objective),)
 
 
 class ParticleObjective(Objective):
-    """An objective of where particles are at some times; computed on the host, in double precision."""
+    """An objective of particles' positions at some times; computed on the host, in double precision."""
+
+    points: np.ndarray | Sequence[Place]
+    """Positions of the particles at the beginning [longer side], (n, 2)."""
+    times: Sequence[float]
+    """Times at which it reads their positions [s]."""
 
     @abstractmethod
     def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
-        """Its part of time t, one of `times`, and the gradient (n, 2), for particles at `places` (n, 2)."""
+        """Its term for time t, one of `times`, and the gradient (n, 2), for particles at `places` (n, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ParticleMisfit(ParticleObjective):
-    """How far particles are from their destinations (Bonilla & Velho, section III, phi):
+    """The distances of particles from their destinations (Bonilla & Velho, section III, phi):
 
         1/2 sum_n weight_n |x_n(t) - destination_n|^2    [longer side^2]
 
     Raises:
-        ValueError: places that are not (n, 2) finite numbers, as many as points; negative weights.
+        ValueError: positions that are not (n, 2) finite numbers; other numbers of points and destinations;
+            negative weights.
     """
 
     points: np.ndarray | Sequence[Place]
     """Where the particles begin [longer side], (n, 2)."""
     destinations: np.ndarray | Sequence[Place]
-    """Where they should be [longer side], (n, 2)."""
+    """Their target positions [longer side], (n, 2)."""
     time: float
-    """When [s]."""
+    """Time of the misfit [s]."""
     weights: np.ndarray | float = 1.0
-    """How much each counts, (n,)."""
+    """Weight of each particle, (n,)."""
 
     def __post_init__(self) -> None:
         for name in ("points", "destinations"):
@@ -120,20 +126,20 @@ class ParticleMisfit(ParticleObjective):
         object.__setattr__(self, "weights", weights)
 
     @property
-    def times(self) -> tuple[float, ...]:
-        """Its one time."""
+    def times(self) -> tuple[float, ...]:  # type: ignore[override]
+        """`time` alone."""
         return (self.time,)
 
     def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
-        """Half the weighted sum of squares, and the weighted misfits."""
-        misfit = places - self.destinations
-        slope = self.weights[:, None] * misfit
-        return 0.5 * float(np.sum(slope * misfit)), slope
+        """Half the weighted sum of squares, and the weighted residuals."""
+        residual = places - np.asarray(self.destinations)
+        slope = np.asarray(self.weights)[:, None] * residual
+        return 0.5 * float(np.sum(slope * residual)), slope
 
 
 @dataclass(frozen=True, eq=False)
 class ParticleFunction(ParticleObjective):
-    """A function of where particles are.
+    """A function of particles' positions.
 
     Raises:
         ValueError: points that are not (n, 2) finite numbers, or no times.
@@ -142,10 +148,10 @@ class ParticleFunction(ParticleObjective):
     points: np.ndarray | Sequence[Place]
     """Where the particles begin [longer side], (n, 2)."""
     function: Callable[[float, np.ndarray], tuple[float, np.ndarray]]
-    """Of the time [s] and the places (n, 2) [longer side]: a value, and its gradient (n, 2). Its values at
-    all times are summed."""
+    """Takes the time [s] and the positions (n, 2) [longer side]; returns a value and its gradient (n, 2).
+    The objective is the sum over all times."""
     times: Sequence[float]
-    """When it is asked [s]."""
+    """Times at which it is evaluated [s]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))
@@ -154,7 +160,7 @@ class ParticleFunction(ParticleObjective):
             raise ValueError("a function of particles needs one time or more")
 
     def at(self, t: float, places: np.ndarray) -> tuple[float, np.ndarray]:
-        """What the function says."""
+        """The function's value and gradient."""
         value, slope = self.function(t, places)
         slope = np.asarray(slope, dtype=np.float64)
         if slope.shape != places.shape:
@@ -164,18 +170,18 @@ class ParticleFunction(ParticleObjective):
 
 @dataclass(frozen=True)
 class Effort(Objective):
-    """What forces cost: 1/2 the integral of |f|^2 over picture and time [longer side^4/s^3].
+    """The effort of forces: 1/2 the integral of |f|^2 over picture and time [longer side^4/s^3].
 
-    f is the mean over a step of all that adds to the velocity, weights included, so that forces which
-    cancel cost nothing. A growth, which prescribes divergence, is not counted.
+    f is the sum of all forces, weights included, averaged over each step: forces that cancel have no effort.
+    A growth, which prescribes divergence, does not count.
     """
 
 
 def places_of(name: str, values: Any) -> np.ndarray:
-    """Places as (n, 2) finite numbers.
+    """Positions as an array (n, 2).
 
     Raises:
-        ValueError: they are not.
+        ValueError: another shape, or a number that is not finite.
     """
     values = np.array(values, dtype=np.float64) if np.size(values) else np.empty((0, 2))  # a copy
     if values.ndim != 2 or values.shape[1] != 2:
@@ -187,7 +193,7 @@ def finite_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:
     """The values as float64.
 
     Raises:
-        ValueError: another shape than expected, or a number that is not finite.
+        ValueError: another shape, or a number that is not finite.
     """
     values = np.asarray(values, dtype=np.float64)
     if values.shape != shape:

@@ -1,4 +1,4 @@
-"""How far the warped picture is from another: through the very look-up that renders frames."""
+"""The misfit between the warped picture and a target, with the look-up that renders frames."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from wfluid.view.lookup_adjoint import ADJOINTS, LookUpAdjoint
 
 @dataclass(frozen=True, eq=False)
 class PictureMisfit(StateObjective):
-    """How far the warped picture is from another, in linear light, alpha premultiplied:
+    """The misfit between the warped picture and a target, in linear light, alpha premultiplied:
 
         1/2 integral over the picture of weight sum_channels (warped - target)^2    [longer side^2]
 
-    The integral is the mean over the pixels of the frame times the picture's area. The target's size is the
-    frame's; a picture that is larger is shrunk to it first, as frames of an animation are.
+    The integral is the mean over the frame's pixels times the picture's area. The frame has the size of
+    the target; a larger picture is first shrunk to it, as for the frames of an animation.
 
     Raises:
         ValueError: a filter without a gradient, an edge that does not exist, a target with other channels
@@ -36,17 +36,17 @@ class PictureMisfit(StateObjective):
     """
 
     picture: Picture
-    """What is warped, stretched over the fluid."""
+    """The picture that is warped, stretched over the fluid."""
     target: Picture
-    """What is wanted; with the transparent edge, which gives the picture an alpha, that as well."""
+    """The target, with the channels of the warped picture: the transparent edge adds an alpha."""
     time: float
-    """When [s]."""
+    """Time of the misfit [s]."""
     filter: str = "cubic"
-    """How the picture is read between pixels: "bilinear" or "cubic"."""
+    """Interpolation between pixels: "bilinear" or "cubic"."""
     edge: str = "clamp"
-    """What lies beyond its edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
+    """Values beyond the picture's edges: "clamp", "mirror", "wrap", "transparent"; periodic axes wrap."""
     weight: Painted | None = None
-    """Where it counts: a factor painted over the picture."""
+    """A factor painted over the picture; 1 by default."""
 
     def __post_init__(self) -> None:
         if self.filter not in ADJOINTS:
@@ -72,12 +72,12 @@ class PictureMisfit(StateObjective):
             )
 
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
-        """On the device, for the grid and walls of `step`."""
+        """The objective on the device, for the grid and walls of `step`."""
         return _PictureTerm(self, step, weight)
 
 
 class _PictureTerm(DeviceObjective):
-    """Half the weighted squares of the pixels shown less those wanted."""
+    """Half the weighted sum of squares of the warped picture minus the target."""
 
     def __init__(self, misfit: PictureMisfit, step: Step, weight: float):
         width, height, grid = misfit.target.width, misfit.target.height, step.grid
@@ -85,7 +85,7 @@ class _PictureTerm(DeviceObjective):
         self._look_up = LookUp(
             misfit.picture.shrunk(width, height),
             grid,
-            step.fluid.walls,
+            step.fluid.boundary,
             self.device,
             width=width,
             height=height,
@@ -105,21 +105,21 @@ class _PictureTerm(DeviceObjective):
         self._rows = zeros(len(self._targets) * height, self.device)
 
     def _on_frame(self, quad: np.ndarray) -> wp.array:
-        """Pixels (height, width, 4) as the look-up lays them out."""
+        """Pixels (height, width, 4) on the device, in the look-up's layout."""
         layout = self.layout
         padded = np.zeros((layout.size, QUAD), dtype=quad.dtype)
         interior(padded, layout)[:] = quad
         return upload(padded, self.device, Pixel)
 
     def _show(self, state: State) -> None:
-        """The warped picture."""
+        """Warp the picture."""
         look_up = self._look_up
         look_up.stretch(state.d_x, state.d_y)
         look_up.place()
         look_up.read()
 
     def measure(self, state: State) -> None:
-        """Sums along rows."""
+        """Compute the weighted squares, summed along rows."""
         self._show(state)
         layout = self.layout
         for n, (shown, target) in enumerate(zip(self._look_up.shown, self._targets, strict=True)):
@@ -127,11 +127,11 @@ class _PictureTerm(DeviceObjective):
             misfit.row_misfits.launch(layout.ny, self.device, inputs, [self._rows])
 
     def value(self) -> float:
-        """Half the sum over rows."""
+        """Half the sum of the last `measure` over rows."""
         return 0.5 * float(read(self._rows).sum(dtype=np.float64))
 
     def adjoint(self, state: State, bar: State) -> None:
-        """The weighted misfit, back through the look-up."""
+        """Apply the transpose of the look-up to the weighted residual."""
         self._show(state)
         self._adjoint.begin()
         for n, (shown, target) in enumerate(zip(self._look_up.shown, self._targets, strict=True)):

@@ -1,13 +1,13 @@
-"""A run that can be gone back through.
+"""A run of steps that can be repeated with other numbers, with its backward pass.
 
-A step, whose stages a `wp.Tape` records, is captured in two graphs: a loop of steps forward, and a loop of
-the tape played back. Of each step only its state is kept: what else the tape reads is computed again, but
-for the solves. Both loops find in device memory which step they are at (`kernels/adjoint/step_table.py`):
-the state it begins with, the numbers of what acts, where to leave what they find. So they are captured
-once, in the time of one step, for runs of any length and whatever their numbers. Only a solve by another
-method (more cycles for a stiffer fluid) has them captured anew.
+Forward, the run takes its steps in a captured loop (`step_loops`) and stores the state after each.
+Backward, a second loop plays the tape of a step, from the last step to the first. Of each step it reads the
+stored state and computes again what else the transposes read; only the solves need not be repeated.
 
-With a cap on memory, segments of the run take turns in the same tables (`checkpoints`).
+If a memory cap leaves no room for all states, the run is cut into segments (`checkpoints`). Forward, the
+state at the beginning of each segment is stored as a checkpoint. Backward, the steps of a segment are taken
+again from its checkpoint, now with all states stored, and then played back. All segments use the rows of
+the same tables.
 """
 
 from __future__ import annotations
@@ -21,60 +21,58 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.timeline import Timeline
-from wfluid.fields.arrays import assign, copy, fill, finite, from_numpy, to_numpy, zeros
+from wfluid.fields.arrays import assign, copy, fill, finite, from_numpy, to_numpy
 from wfluid.fields.device import load_kernels
 from wfluid.fields.graph import CapturedGraph
 from wfluid.fields.state import State
 from wfluid.gradient.checkpoints import Advance, Restore, Reverse, Schedule, Store, even_segments, least_room
 from wfluid.gradient.state_objectives import DeviceObjective
-from wfluid.gradient.step_tables import StepCounter, StepTable
+from wfluid.gradient.step_loops import WORKING_STATES, StepLoops, WorkingStates
+from wfluid.gradient.step_tables import StepTable
 from wfluid.gradient.variables import Setup
-from wfluid.kernels.adjoint import misfit
-from wfluid.kernels.cell.strips import STRIP, repeat_while
 from wfluid.step.forcing import Forcing
 from wfluid.step.step import Step
-from wfluid.step.tape import recording
 
 MEGABYTE = 2**20
 
-WORKING_STATES = 4
-"""Before and after a step, and the gradients with respect to both."""
+Watch = Callable[[int, State], None]
+"""Is called in the backward pass with each step and the gradient with respect to the state before it."""
 
 
 @dataclass(frozen=True)
 class RunGradients:
-    """The gradients that going back through a run found."""
+    """The gradients that the backward pass of a run computes."""
 
     velocity: np.ndarray
     """With respect to the velocity at the beginning, (2, ny, nx)."""
     viscosity: np.ndarray
     """With respect to the viscosity at centres, (ny, nx); 0 unless it was asked for."""
     forces: Mapping[int, np.ndarray]
-    """With respect to what each force does in every step (`Forcing.gradients`)."""
-    sources: list[Mapping[int, np.ndarray]]
+    """With respect to the impulses of each force in every step (`Forcing.gradients`)."""
+    sources: Sequence[Mapping[int, np.ndarray]]
     """The same for the sources of each density."""
 
 
 @dataclass(frozen=True, eq=False)
 class StepRange:
-    """Steps of a timeline that are run."""
+    """The steps of a timeline that a run consists of."""
 
     first: int
-    """The first of them."""
+    """Number of the first step."""
     last: int
-    """The step before which they end."""
+    """Number of the step before which the run ends."""
     begun: State | None
-    """The fluid at the first; None at rest."""
+    """The state before the first step; None for fluid at rest, or with the velocity of the `Setup`."""
     points: np.ndarray
-    """Where particles begin [longer side], (n, 2)."""
+    """Positions of the particles at the beginning [longer side], (n, 2)."""
 
 
 class Recording:
-    """A run of a timeline's steps, ready to be repeated with other numbers and gone back through.
+    """A run of a `StepRange` of a timeline, with its backward pass.
 
-    It runs over a `StepRange` of the timeline. `terms` are objectives of the state after some steps. With
-    `effort` half the squares of what forces add count too. With `room` for more steps than it has it can be
-    `moved` to other stretches.
+    `terms` are objectives of the state after some steps, counted from the run's beginning. With `effort` the
+    squared velocity changes due to forces count too (`Effort`). The tables have rows for at least `room`
+    steps, so that the recording can be `moved` to longer ranges.
 
     Raises:
         ValueError: a memory cap too small, with the least that works.
@@ -85,7 +83,7 @@ class Recording:
         step: Step,
         setup: Setup,
         timeline: Timeline,
-        stretch: StepRange,
+        steps: StepRange,
         terms: Mapping[int, Sequence[DeviceObjective]],
         memory_mb: float | None = None,
         of_viscosity: bool = False,
@@ -93,92 +91,72 @@ class Recording:
         room: int = 0,
     ):
         self.step, self.timeline, self.device = step, timeline, step.device
-        self._stretch, self._terms = stretch, terms
-        self._term_replays: dict[Callable, CapturedGraph] = {}
+        self._range, self._terms = steps, terms
+        self._term_graphs: dict[Callable, CapturedGraph] = {}
         grid, device = step.grid, step.device
         self._effort = grid.hx * grid.hy / timeline.dt if effort else 0.0
         load_kernels(device)
-        self._of_viscosity = of_viscosity
         step.allow_gradients(of_viscosity)
-        self._before, self._after, self._bar, self._after_bar = (
-            State.at_rest(grid, device, len(step.densities), len(stretch.points))
-            for _ in range(WORKING_STATES)
-        )
-        self._before.take_gradient(self._bar)
-        self._after.take_gradient(self._after_bar)
-        self._end = self._before.view()  # the same arrays for objectives, which add to what comes after
-        self._end.take_gradient(self._after_bar)
+        self._working = WorkingStates(step, len(steps.points))
         self.schedule = self._planned(memory_mb)
         longest = max(end - start for start, end in self.schedule.segments)
-        rows = max(self.steps, room) if self.schedule.keeps_all else longest
-        stored = 0 if self.schedule.keeps_all else len(self.schedule.segments)
-        self.room = rows
-        self._states = [StepTable(a, rows + 1) for a in self._kept(self._before)]
-        self._stored = [StepTable(a, stored) for a in self._kept(self._before)]
-        self._forcing = Forcing(setup.forces, setup.fluid, grid, device, gradients=True, effort=self._effort)
-        self._numbers, self._boxes, self._bars = (
-            StepTable(a, rows) for a in (self._forcing.numbers, self._forcing.boxes, self._forcing.bars)
-        )
-        self._pulls = [StepTable(p, rows + 1) for p in self._before.particles]
-        changes = step.medium and step.medium.changes
-        self._viscosities = StepTable(step.medium.painted_mu, rows) if changes else None
-        self._squares = zeros(2 * grid.ny if effort else 0, device)
-        self._square_rows = StepTable(self._squares, rows)
-        self._counter, self._pool = StepCounter(device), step.helpers(alone=True)
-        self._preparation: CapturedGraph | None = None
-        self._tape = wp.Tape()
-        self._plan: tuple = ()
+        self.room = max(self.steps, room) if self.schedule.keeps_all else longest
+        checkpoints = 0 if self.schedule.keeps_all else len(self.schedule.segments)
+        self._checkpoints = [StepTable(a, checkpoints) for a in self._stored_before]
+        forcing = Forcing(setup.forces, setup.fluid, grid, device, gradients=True, effort=self._effort)
+        self.loops = StepLoops(step, self._working, forcing, self.room, of_viscosity, effort)
         self.set(setup)
 
     schedule: Schedule
-    """How its segments are kept and stored."""
+    """The segments of the run and their checkpoints."""
     room: int
-    """Steps that are kept at once."""
+    """Number of steps whose states are stored at once."""
 
     @property
     def steps(self) -> int:
-        """How many steps it has."""
-        return self._stretch.last - self._stretch.first
+        """Number of steps."""
+        return self._range.last - self._range.first
 
-    def moved(self, setup: Setup, stretch: StepRange) -> None:
-        """Run over another stretch, for which there is room, with as many points, and with another setup.
+    def moved(self, setup: Setup, steps: StepRange) -> None:
+        """Run another range of steps with another setup, which it `suits`.
 
         Raises:
             ValueError: as `set`.
         """
-        self._stretch = stretch
+        self._range = steps
         self.schedule = self._planned(None)
         self.set(setup)
 
-    def suits(self, setup: Setup, stretch: StepRange, effort: bool) -> bool:
-        """Whether it may be `moved` to a stretch and a setup of the same fluid."""
+    def suits(self, setup: Setup, steps: StepRange, effort: bool) -> bool:
+        """Whether it can be `moved` to a range of steps and a setup: its graphs and tables fit them."""
         return (
             self.schedule.keeps_all
             and not self._terms
             and effort == bool(self._effort)
-            and stretch.last - stretch.first <= self.room
-            and len(stretch.points) == len(self._stretch.points)
+            and steps.last - steps.first <= self.room
+            and len(steps.points) == len(self._range.points)
             and setup.fluid is self.step.fluid
             and Forcing.key(setup.forces) == Forcing.key(self._setup.forces)
         )
 
-    def _kept(self, state: State) -> list[wp.array]:
-        """What of a state is kept for every step: all, but for a pressure that the next step does not use."""
-        fields = state.fields if self.step.medium else [f for f in state.fields if f is not state.q]
-        return [*fields, *state.particles]
+    @property
+    def _stored_before(self) -> list[wp.array]:
+        """The arrays of the current state that are stored for every step."""
+        return self._working.stored(self._working.before)
 
     def _planned(self, memory_mb: float | None) -> Schedule:
+        """The schedule with the longest segments that fit in the memory."""
         breaks = [step for step, terms in self._terms.items() if terms]
         if memory_mb is None:
             return even_segments(self.steps, breaks=breaks)
-        medium, row = self.step.medium, sum(a.capacity for a in self._kept(self._before))
-        if medium and medium.changes:
-            row += self._before.u.capacity  # each step's own viscosity
-        each = row / MEGABYTE
+        coefficients, row = self.step.coefficients, sum(a.capacity for a in self._stored_before)
+        if coefficients and coefficients.changes:
+            row += self._working.before.u.capacity  # the viscosity of the step
+        state_mb = row / MEGABYTE
         try:
-            return even_segments(self.steps, int(memory_mb / each) - WORKING_STATES, breaks)
+            return even_segments(self.steps, int(memory_mb / state_mb) - WORKING_STATES, breaks)
         except ValueError:
-            least = math.ceil(100 * (least_room(self.steps, breaks) + WORKING_STATES) * each) / 100
+            least = math.ceil(100 * (least_room(self.steps, breaks) + WORKING_STATES) * state_mb) / 100
             raise ValueError(
                 f"memory_mb {memory_mb:g}: {self.steps} steps on {self.step.grid.nx} x "
                 f"{self.step.grid.ny} cells need at least {least:g}"
@@ -186,277 +164,192 @@ class Recording:
 
     @property
     def memory(self) -> int:
-        """Bytes of all states and gradients."""
-        viscosities = [self._viscosities] if self._viscosities else []
-        tables = sum(table.array.capacity for table in (*self._states, *self._stored, *viscosities))
-        return tables + WORKING_STATES * sum(a.capacity for a in self._kept(self._before))
+        """Memory of all states and their gradients [bytes]."""
+        viscosities = [self.loops.viscosities] if self.loops.viscosities else []
+        tables = (*self.loops.states, *self._checkpoints, *viscosities)
+        working = WORKING_STATES * sum(a.capacity for a in self._stored_before)
+        return sum(table.array.capacity for table in tables) + working
 
     def time_of(self, step: int) -> float:
-        """When a step begins [s]."""
-        return self.timeline.time_of(self._stretch.first + step)
+        """The time at which a step of the run begins [s]."""
+        return self.timeline.time_of(self._range.first + step)
 
     def set(self, setup: Setup) -> None:
-        """Take a setup whose fluid and forces differ from the first in numbers only.
+        """Set the numbers of the fluid and forces, whose types must be those of the first setup.
 
         Raises:
             ValueError: a force beyond the limit.
         """
         self._setup, dt = setup, self.timeline.dt
-        rows, swelled = [], False
-        before = min(1, self._stretch.first)  # the step before decides what of its pressure is kept
+        rows, prescribed = [], False
+        before = min(1, self._range.first)  # the pressure part of the first step depends on the step before
         for n in range(-before, self.steps):
-            kept = self.step.kept(dt, dt if self._stretch.first + n else 0.0, swelled)
+            last_dt = dt if self._range.first + n else 0.0
+            part = self.step.pressure_part(dt, last_dt, prescribed)
             t, until = self.time_of(n), self.time_of(n + 1)
-            rows.append(self._forcing.row(setup.forces, setup.fluid, t, dt, until, kept, live=True))
-            swelled = rows[-1].prescribed > 0
-        self._all_numbers = np.stack([row.numbers for row in rows[before:]])
-        self._all_boxes = np.stack([row.boxes for row in rows[before:]])
+            row = self.loops.forcing.row(setup.forces, setup.fluid, t, dt, until, part, act_at_zero=True)
+            prescribed = row.prescribed > 0
+            rows.append(row)
+        self._numbers = np.stack([row.numbers for row in rows[before:]])
+        self._boxes = np.stack([row.boxes for row in rows[before:]])
         self.step.take_fluid(setup.fluid)
-        if self._viscosities:
-            plan = self.step.expect([self.time_of(n + 1) for n in range(self.steps)], dt)
+        if self.loops.viscosities:
+            methods = self.step.expect([self.time_of(n + 1) for n in range(self.steps)], dt)
         else:
-            plan = self.step.plan(self.time_of(1), dt, self._prepare)
-        if plan != self._plan:
-            self._plan = ()  # should the captures be interrupted
-            self.step.allow_gradients(self._of_viscosity)
-            forward = CapturedGraph(self.device, self._record, self._pool)
-            backward = CapturedGraph(self.device, self._play_back, self._pool)
-            self._forward, self._backward, self._plan = forward, backward, plan
+            methods = self.step.plan(self.time_of(1), dt, self.loops.update_coefficients)
+        self.loops.capture(methods)
 
-    def _prepare(self) -> None:
-        if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self.step.follow_medium, self._pool)
-        self._preparation.launch()
+    def forward(self, observed: Sequence[int] = ()) -> tuple[float, dict[int, np.ndarray]]:
+        """Run all steps.
 
-    def _record(self) -> None:
-        """Steps in a loop; the tape records one of them; launches only."""
-        counter, forcing, before, after = self._counter, self._forcing, self._before, self._after
-
-        def work() -> None:
-            self._numbers.take(counter, forcing.numbers)
-            self._boxes.take(counter, forcing.boxes)
-            self._take_viscosity()
-            if _first_strip():  # what the others launch is the same
-                with recording() as self._tape:
-                    self.step.advance(before, after, forcing)
-            else:
-                self.step.advance(before, after, forcing)
-            if self._squares.size:
-                self._measure_effort()
-                self._square_rows.give(counter, self._squares)
-            for table, f, to in zip(self._states, self._kept(after), self._kept(before), strict=True):
-                table.give(counter, f, ahead=1)
-                table.copy(f, to)
-            counter.count(1)
-
-        repeat_while(counter.going, work)
-
-    def _take_viscosity(self) -> None:
-        """Take the step's own viscosity, where it depends on the time; launches only."""
-        if not self._viscosities:
-            return
-        medium = self.step.medium
-        self._viscosities.take(self._counter, medium.painted_mu)
-        medium.fill_painted()
-        if not self.step.fluid.viscosity_moves:  # else it is taken along in the step
-            self.step.follow_medium()
-
-    def _measure_effort(self) -> None:
-        """Squares of what forces add to the velocity, summed along rows; launches only."""
-        state, layout = self._before, self.step.layout
-        pushed = self.step.pushed if self._forcing.pushes else (state.u, state.v)
-        for n, (f, before) in enumerate(zip(pushed, (state.u, state.v), strict=True)):
-            inputs = [f, before, layout.nx, layout.pitch, n * layout.ny]
-            misfit.row_squares.launch(layout.ny, self.device, inputs, [self._squares])
-
-    def _play_back(self) -> None:
-        """The tape in a loop; launches only."""
-        repeat_while(self._counter.going, self._step_back)
-
-    def _step_back(self) -> None:
-        counter, forcing, before = self._counter, self._forcing, self._before
-        counter.count(-1)
-        self._numbers.take(counter, forcing.numbers)
-        self._boxes.take(counter, forcing.boxes)
-        self._take_viscosity()
-        for table, f in zip(self._states, self._kept(before), strict=True):
-            table.take(counter, f)
-        for pulls, bar in zip(self._pulls, self._after_bar.particles, strict=True):
-            pulls.add_to(counter, bar, ahead=1)
-        self.step.recompute(before, forcing)
-        self._tape.backward()
-        self._bars.give(counter, forcing.bars)
-        bars = zip(self._states, self._kept(self._bar), self._kept(self._after_bar), strict=True)
-        for table, f, to in bars:
-            table.copy(f, to)
-
-    def forward(self, looked_at: Sequence[int] = ()) -> dict[int, np.ndarray]:
-        """Run it; where the particles are [longer side], (n, 2), after each of the steps `looked_at`."""
+        Returns the value of the effort and the terms, and the particles' positions [longer side], (n, 2),
+        after each of the `observed` steps.
+        """
         self._begin()
-        places: dict[int, np.ndarray] = {}
-        self._value = 0.0
+        positions: dict[int, np.ndarray] = {}
+        value = 0.0
         for action in self.schedule.forward():
-            self._do(action)
+            self._play(action)
             if not isinstance(action, Advance):
                 continue
-            base = self._base(action.start)
-            length = action.end - action.start
-            for step in looked_at:
+            base, length = self._base(action.start), action.end - action.start
+            for step in observed:
                 if action.start < step <= action.end:
-                    places[step] = self._places_at(base + step - action.start)
-            for squares in self._square_rows.rows(base, base + length):  # in an order that no cap changes
-                self._value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
+                    positions[step] = self._positions_at(base + step - action.start)
+            for squares in self.loops.squares.rows(base, base + length):  # in the same order for any segments
+                value += 0.5 * self._effort * float(squares.sum(dtype=np.float64))
             for term in self._terms.get(action.end, ()):
-                self._replay(term, term.measure).launch()
-                self._value += term.value()
-        return places
-
-    @property
-    def value(self) -> float:
-        """What the last `forward` found of effort and of the terms."""
-        return self._value
+                self._term_graph(term, term.measure).launch()
+                value += term.value()
+        return value, positions
 
     def end(self) -> State:
         """A copy of the state at the end of the last `forward`."""
-        return self._before.copy()
+        return self._working.before.copy()
 
     @property
     def finite(self) -> bool:
-        """Whether the fluid was at the end of the last `forward`; what is not finite spreads, and stays."""
-        return finite(self._kept(self._before))
+        """Whether the state at the end of the last `forward` is finite; what is not finite stays so."""
+        return finite(self._stored_before)
 
-    def _places_at(self, row: int) -> np.ndarray:
-        columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self._states[-2:]]
+    def _positions_at(self, row: int) -> np.ndarray:
+        """The particles' positions [longer side], (n, 2), in a row of the tables."""
+        columns = [table.rows(row, row + 1)[0].astype(np.float64) for table in self.loops.states[-2:]]
         return np.stack(columns, axis=1) * (self.step.grid.hx, self.step.grid.hy)
 
     def first_step_not_finite(self) -> int | None:
-        """The first step after which the fluid is not finite, run again; None where it stays so."""
+        """Repeat the run to find the first step after which the state is not finite; None if it always is."""
         self._begin()
         for action in self.schedule.forward():
-            self._do(action)
+            self._play(action)
             if isinstance(action, Advance):
                 base = self._base(action.start)
                 for n in range(action.end - action.start):
-                    ends = [table.rows(base + n + 1, base + n + 2) for table in self._states]
+                    ends = [table.rows(base + n + 1, base + n + 2) for table in self.loops.states]
                     if not all(np.all(np.isfinite(end)) for end in ends):
                         return action.start + n
         return None
 
-    def backward(
-        self, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None = None
-    ) -> RunGradients:
-        """Go back through the last `forward`.
+    def backward(self, particle_bars: Mapping[int, np.ndarray], watch: Watch | None = None) -> RunGradients:
+        """The backward pass of the last `forward`.
 
-        `pulls` are gradients (n, 2) with respect to the particles' places [longer side] after some steps.
-        With `watch`, which is told each step and the gradient before it, all is done singly, not replayed.
+        `particle_bars` are gradients (n, 2) with respect to the particles' positions [longer side], by the
+        number of the step after which they are. With `watch` every step is launched without a graph.
         """
-        self._clear()
-        bars = np.zeros((self.steps, self._bars.size))
+        fill(0.0, self.step.mu_bar)
+        self._working.after_bar.zero_()
+        bars = np.zeros((self.steps, self.loops.bars.size))
         for action in self.schedule.backward():
             if isinstance(action, Reverse):
-                self._reverse(action, pulls, watch)
+                self._reverse(action, particle_bars, watch)
                 base, length = self._base(action.start), action.end - action.start
-                bars[action.start : action.end] = self._bars.rows(base, base + length)
+                bars[action.start : action.end] = self.loops.bars.rows(base, base + length)
             else:
-                self._do(action)
-        layout, numbers = self.step.layout, self._all_numbers
-        velocity = [to_numpy(f, layout).astype(np.float64) for f in (self._after_bar.u, self._after_bar.v)]
-        if self.step.medium:
-            self.step.medium.fold_painted()
+                self._play(action)
+        layout, bar, forcing = self.step.layout, self._working.after_bar, self.loops.forcing
+        velocity = [to_numpy(f, layout).astype(np.float64) for f in (bar.u, bar.v)]
+        if self.step.coefficients:
+            self.step.coefficients.fold_painted()
         return RunGradients(
             np.stack(velocity),
             to_numpy(self.step.mu_bar, layout).astype(np.float64),
-            self._forcing.gradients(numbers, bars),
-            self._forcing.source_gradients(numbers, bars),
+            forcing.gradients(self._numbers, bars),
+            forcing.source_gradients(self._numbers, bars),
         )
 
-    def _clear(self) -> None:
-        """Begin with no gradients."""
-        fill(0.0, self.step.mu_bar)
-        self._after_bar.zero_()
-
-    def _reverse(
-        self, action: Reverse, pulls: Mapping[int, np.ndarray], watch: Callable[[int, State], None] | None
-    ) -> None:
-        """Go back through one segment."""
+    def _reverse(self, action: Reverse, particle_bars: Mapping[int, np.ndarray], watch: Watch | None) -> None:
+        """The backward pass of one segment, whose states are in the tables."""
         start, length, base = action.start, action.end - action.start, self._base(action.start)
         terms = self._terms.get(action.end, ())
         if terms:
-            self._copy([table.row(base + length) for table in self._states], self._kept(self._before))
+            self._copy([table.row(base + length) for table in self.loops.states], self._stored_before)
         for term in terms:
-            self._replay(term, term.adjoint).launch()
+            self._term_graph(term, term.adjoint).launch()
         scales = (self.step.grid.hx, self.step.grid.hy)
-        for axis, (table, h) in enumerate(zip(self._pulls, scales, strict=True)):
+        for axis, (table, h) in enumerate(zip(self.loops.particle_bars, scales, strict=True)):
             rows = np.zeros((length, table.size))
             for n in range(length):
-                if start + n + 1 in pulls:
-                    rows[n] = pulls[start + n + 1][:, axis] * h
+                if start + n + 1 in particle_bars:
+                    rows[n] = particle_bars[start + n + 1][:, axis] * h
             table.put(base + 1, rows)
         if watch is None:
-            self._counter.set(base + length, base)
-            self._backward.launch()
+            self.loops.backward(base, base + length)
             return
         for n in reversed(range(length)):
-            self._counter.set(base + n + 1, base + n)
-            self._step_back()
-            watch(start + n, self._bar)
+            self.loops.backward_step(base + n)
+            watch(start + n, self._working.bar)
 
-    def _replay(self, term: DeviceObjective, work: Callable) -> CapturedGraph:
-        """Launches of a term, captured when first used."""
-        if work not in self._term_replays:
-            arguments = [self._end, self._after_bar] if work == term.adjoint else [self._end]
-            self._term_replays[work] = CapturedGraph(self.device, partial(work, *arguments), None)
-        return self._term_replays[work]
+    def _term_graph(self, term: DeviceObjective, work: Callable) -> CapturedGraph:
+        """The launches of a term's method, captured when first used."""
+        if work not in self._term_graphs:
+            end, bar = self._working.end, self._working.after_bar
+            arguments = [end, bar] if work == term.adjoint else [end]
+            self._term_graphs[work] = CapturedGraph(self.device, partial(work, *arguments), None)
+        return self._term_graphs[work]
 
     def _base(self, start: int) -> int:
         """The row of a segment's first state."""
         return start if self.schedule.keeps_all else 0
 
     def _begin(self) -> None:
-        """The state at the beginning: what was given, or at rest but for the velocity."""
-        state, step, grid = self._before, self.step, self.step.grid
-        for p, column, h in zip(state.particles, self._stretch.points.T, (grid.hx, grid.hy), strict=True):
+        """Set the state at the beginning: the one given, or fluid at rest with the setup's velocity."""
+        state, step, grid = self._working.before, self.step, self.step.grid
+        for p, column, h in zip(state.particles, self._range.points.T, (grid.hx, grid.hy), strict=True):
             assign(column / h, p)
-        if self._stretch.begun:
-            for a, b in zip(self._stretch.begun.fields, state.fields, strict=True):
-                copy(a, b)
+        if self._range.begun:
+            self._copy(self._range.begun.fields, state.fields)
             return
         fill(0.0, *state.fields)
         for density, rho in zip(step.densities, state.rho, strict=True):
             density.begin(rho)
-        pairs = zip(self._setup.velocity, (state.u, state.v), step.velocity_ghosts, strict=True)
-        for values, f, ghosts in pairs:
+        components = zip(self._setup.velocity, (state.u, state.v), step.velocity_ghosts, strict=True)
+        for values, f, ghosts in components:
             from_numpy(values, f, step.layout)
             ghosts.fill(f)
 
-    def _do(self, action: Advance | Store | Restore) -> None:
+    def _play(self, action: Advance | Store | Restore | Reverse) -> None:
+        """Take the steps of a segment, or copy the current state to or from a checkpoint."""
         if isinstance(action, Advance):
-            start, end, base = action.start, action.end, self._base(action.start)
-            self._put(start, end)
-            self._counter.set(base, base + end - start)
-            self._forward.launch()
-            return
-        number = [start for start, _ in self.schedule.segments].index(action.step)
-        stored = [table.row(number) for table in self._stored]
-        now = self._kept(self._before)
-        self._copy(*((now, stored) if isinstance(action, Store) else (stored, now)))
+            base = self._base(action.start)
+            self._upload(action.start, action.end)
+            self.loops.forward(base, base + action.end - action.start)
+        elif isinstance(action, Store | Restore):
+            number = [start for start, _ in self.schedule.segments].index(action.step)
+            checkpoint, current = [table.row(number) for table in self._checkpoints], self._stored_before
+            self._copy(*((current, checkpoint) if isinstance(action, Store) else (checkpoint, current)))
 
-    def _put(self, start: int, end: int) -> None:
-        """Put the numbers of some steps, and the state they begin with, on the device."""
-        base = self._base(start)
-        self._numbers.put(base, self._all_numbers[start:end])
-        self._boxes.put(base, self._all_boxes[start:end])
-        for step in range(start, end) if self._viscosities else ():
-            row = self._viscosities.row(base + step - start)
-            from_numpy(self.step.medium.at(self.time_of(step + 1)), row, self.step.layout)
-        self._copy(self._kept(self._before), [table.row(base) for table in self._states])
+    def _upload(self, start: int, end: int) -> None:
+        """Write the numbers of a segment's steps, and the current state before them, to the tables."""
+        base, coefficients, viscosities = self._base(start), self.step.coefficients, self.loops.viscosities
+        self.loops.numbers.put(base, self._numbers[start:end])
+        self.loops.boxes.put(base, self._boxes[start:end])
+        if coefficients and viscosities:
+            for step in range(start, end):
+                mu, row = coefficients.at(self.time_of(step + 1)), viscosities.row(base + step - start)
+                from_numpy(mu, row, self.step.layout)
+        self._copy(self._stored_before, [table.row(base) for table in self.loops.states])
 
     def _copy(self, source: Sequence[wp.array], to: Sequence[wp.array]) -> None:
+        """Copy arrays to others."""
         for a, b in zip(source, to, strict=True):
             copy(a, b)
-
-
-def _first_strip() -> bool:
-    """Whether the first strip, or the only one, is being captured."""
-    strip = STRIP.get()
-    return strip is None or strip.index == 0

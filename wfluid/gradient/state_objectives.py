@@ -1,4 +1,4 @@
-"""Objectives of the state on the device: misfits of maps and densities, and Warp programs."""
+"""Objectives of the state, computed on the device: misfits of maps and densities, and Warp programs."""
 
 from __future__ import annotations
 
@@ -25,16 +25,19 @@ class StateObjective(Objective):
     """An objective of the fluid at one time."""
 
     time: float
-    """When [s]."""
+    """Time at which it is evaluated [s]."""
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Its one time."""
+        """`time` alone."""
         return (self.time,)
 
     @abstractmethod
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
-        """It on the device, for the grid and fluid of `step`; `particles` are its own of the state's."""
+        """The objective on the device, times `weight`, for the grid and fluid of `step`.
+
+        `particles` are the entries of its particles among the state's.
+        """
 
 
 class DeviceObjective(ABC):
@@ -42,11 +45,11 @@ class DeviceObjective(ABC):
 
     @abstractmethod
     def measure(self, state: State) -> None:
-        """Find its value at a state: launches only."""
+        """Compute its value at a state: launches only."""
 
     @abstractmethod
     def value(self) -> float:
-        """What the last `measure` found."""
+        """The value computed by the last `measure`."""
 
     @abstractmethod
     def adjoint(self, state: State, bar: State) -> None:
@@ -55,23 +58,23 @@ class DeviceObjective(ABC):
 
 @dataclass(frozen=True, eq=False)
 class MapMisfit(StateObjective):
-    """How far the map is from another: 1/2 the integral over the picture of weight |d - target|^2.
+    """The misfit of the map: 1/2 the integral over the picture of weight |d - target|^2.
 
-    d is the displacement source - x, as `State.displacement` has it [longer side].
+    d is the displacement source - x, as in `State.displacement` [longer side].
 
     Raises:
         ValueError: a target that is not finite or not (2, ny, nx) of the grid.
     """
 
     target: np.ndarray
-    """Displacement that is wanted [longer side], (2, ny, nx)."""
+    """Target displacement [longer side], (2, ny, nx)."""
     time: float
-    """When [s]."""
+    """Time at which it is evaluated [s]."""
     weight: Painted | None = None
-    """Where it counts: a factor painted over the picture."""
+    """A factor painted over the picture; 1 by default."""
 
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
-        """On the device, where displacements are in cells."""
+        """The objective on the device, where displacements are in cells."""
         grid = step.grid
         scales = (grid.hx, grid.hy)
         target = finite_array("MapMisfit.target", self.target, (2, grid.ny, grid.nx))
@@ -82,7 +85,7 @@ class MapMisfit(StateObjective):
 
 @dataclass(frozen=True, eq=False)
 class DensityMisfit(StateObjective):
-    """How far a density is from another: 1/2 the integral over the picture of weight (rho - target)^2.
+    """The misfit of a density: 1/2 the integral over the picture of weight (rho - target)^2.
 
     Raises:
         ValueError: a density that does not exist; a target that is not finite or not (ny, nx) of the grid.
@@ -91,14 +94,14 @@ class DensityMisfit(StateObjective):
     density: str
     """Name of the `Density`."""
     target: np.ndarray
-    """What is wanted, (ny, nx)."""
+    """Target density, (ny, nx)."""
     time: float
-    """When [s]."""
+    """Time at which it is evaluated [s]."""
     weight: Painted | None = None
-    """Where it counts: a factor painted over the picture."""
+    """A factor painted over the picture; 1 by default."""
 
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
-        """On the device."""
+        """The objective on the device."""
         grid, names = step.grid, step.fluid.density_names
         if self.density not in names:
             there = ", ".join(names) or "none"
@@ -109,7 +112,7 @@ class DensityMisfit(StateObjective):
 
 
 class _FieldMisfit(DeviceObjective):
-    """Half the weighted squares of fields at centres less what they should be."""
+    """Half the weighted sum of squares of fields at centres minus their targets."""
 
     def __init__(
         self,
@@ -121,7 +124,7 @@ class _FieldMisfit(DeviceObjective):
     ):
         self._names, self.layout, self.device, grid = names, step.layout, step.device, step.grid
         fields = len(names)
-        self._targets, self._weights, self._left, self._weighted = (
+        self._targets, self._weights, self._residuals, self._weighted = (
             vector(self.layout, self.device, fields) for _ in range(4)
         )
         painted = np.ones((grid.ny, grid.nx)) if paint is None else paint.sample(grid)
@@ -134,23 +137,23 @@ class _FieldMisfit(DeviceObjective):
         return [state.rho[name] if isinstance(name, int) else getattr(state, name) for name in self._names]
 
     def measure(self, state: State) -> None:
-        """Sums along rows."""
+        """Compute the weighted squares, summed along rows."""
         self._misfit(state)
-        self._inner.along_rows(self._left, self._weighted)
+        self._inner.along_rows(self._residuals, self._weighted)
 
     def _misfit(self, state: State) -> None:
-        """What is left of each field, and that times its weight."""
+        """Compute the residual of each field, and the residual times its weight."""
         for n, f in enumerate(self._fields(state)):
-            out = [self._left[n], self._weighted[n]]
+            out = [self._residuals[n], self._weighted[n]]
             inputs = [f, self._targets[n], self._weights[n]]
             misfit.misfit.launch(self.layout, self.device, inputs, out)
 
     def value(self) -> float:
-        """Half the sum over rows."""
+        """Half the sum of the last `measure` over rows."""
         return 0.5 * self._inner.total()
 
     def adjoint(self, state: State, bar: State) -> None:
-        """The weighted misfit."""
+        """Add the weighted residuals."""
         self._misfit(state)
         for weighted, to in zip(self._weighted, self._fields(bar), strict=True):
             algebra.add.launch(self.layout, self.device, [weighted], [to])
@@ -158,7 +161,7 @@ class _FieldMisfit(DeviceObjective):
 
 @dataclass(frozen=True, eq=False)
 class WarpObjective(StateObjective):
-    """An objective in Warp: kernels of one's own, which Warp differentiates.
+    """A user-defined objective: Warp kernels, which Warp differentiates.
 
     >>> @wp.kernel
     ... def spread(x: wp.array[float], y: wp.array[float], value: wp.array[float]):
@@ -168,60 +171,61 @@ class WarpObjective(StateObjective):
     ...     wp.launch(spread, len(state.p_x), [state.p_x, state.p_y, value])
     >>> objective = WarpObjective(launch, time=1.0, points=[(0.4, 0.5)])
 
-    The program is called once, and what it launches captured and repeated: it must do nothing but launch.
-    Fields have ghosts, and rows padded to whole spans: the cell in column i of row j is entry
-    `first + j * pitch + i` of `state.layout`; what is read elsewhere has no gradient.
+    The program is called once; its launches are captured and repeated. So it must do nothing but launch.
+    Fields have ghosts and padded rows: with `state.layout`, the cell in column i of row j is entry
+    `first + j * pitch + i`. Values read from other entries have no gradient.
 
     Raises:
-        ValueError: a program that launches nothing, when the objective is first asked for.
+        ValueError: a program that launches nothing, when the objective is first evaluated.
     """
 
     program: Callable[[State, wp.array], Any]
     """Launches kernels that read the state's arrays (units as `State` says) and add to `value[0]`."""
     time: float
-    """When [s]."""
+    """Time at which it is evaluated [s]."""
     points: np.ndarray | Sequence[Place] = field(default_factory=lambda: np.empty((0, 2)))
-    """Where particles begin [longer side], (n, 2), whose places are the state's p_x and p_y."""
+    """Positions of particles at the beginning [longer side], (n, 2). Positions later are the state's p_x and
+    p_y [cells]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))
 
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
-        """On the device."""
+        """The objective on the device."""
         return _Program(self.program, weight, particles, step.device)
 
 
 class _Program(DeviceObjective):
-    """A user's launches, on a tape of their own."""
+    """A user's launches, recorded on a tape of their own."""
 
     def __init__(
         self, program: Callable[[State, wp.array], Any], weight: float, particles: slice, device: wp.Device
     ):
         self._program, self._weight, self._particles = program, weight, particles
         self._value = zeros(1, device, gradient=True)
-        self._nothing = zeros(0, device)
+        self._no_points = zeros(0, device)
 
     def measure(self, state: State) -> None:
-        """Run the program on a tape of its own."""
+        """Run the program, recorded on its tape."""
         fill(0.0, self._value)
-        own = self._particles
-        p_x, p_y = (p[own] if own.stop > own.start else self._nothing for p in state.particles)
+        entries = self._particles
+        p_x, p_y = (p[entries] if entries.stop > entries.start else self._no_points for p in state.particles)
         self._tape = wp.Tape()
-        own_state = replace(state, p_x=p_x, p_y=p_y)
+        seen = replace(state, p_x=p_x, p_y=p_y)
         with self._tape:
-            self._program(own_state, self._value)
+            self._program(seen, self._value)
         if not self._tape.launches:
             raise ValueError("WarpObjective: the program launched no kernel that Warp can differentiate")
         arrays = [a for n in self._tape.launches if not callable(n) for a in (*n[3], *n[4])]
-        kept = {a.ptr for a in (*own_state.arrays, self._value)}
-        self._between = [a for a in arrays if isinstance(a, wp.array) and a.grad and a.ptr not in kept]
+        others = {a.ptr for a in (*seen.arrays, self._value)}
+        self._intermediate = [a for a in arrays if isinstance(a, wp.array) and a.grad and a.ptr not in others]
 
     def value(self) -> float:
-        """Times the weight."""
+        """The program's value times the weight."""
         return self._weight * float(read(self._value)[0])
 
     def adjoint(self, state: State, bar: State) -> None:
-        """Play the tape back: the state's arrays know their gradients."""
+        """Play the tape backward, which adds to the gradients of the state's arrays, `bar`."""
         fill(self._weight, self._value.grad)
-        fill(0.0, *(a.grad for a in self._between))
+        fill(0.0, *(a.grad for a in self._intermediate))
         self._tape.backward()

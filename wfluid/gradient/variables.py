@@ -1,4 +1,7 @@
-"""The numbers that may vary, as one flat vector: named slices, scaled, packed and unpacked in one place."""
+"""The free numbers of a setup as one flat vector, with a scaled slice for each name.
+
+Users give names as text ("forces[0].vector"). Everything else uses addresses ("forces", 0, "vector").
+"""
 
 from __future__ import annotations
 
@@ -18,9 +21,12 @@ from wfluid.model.painted import Painted
 from wfluid.model.uniform_forces import Buoyancy
 
 POSITIVE = ("radius", "period", "viscosity")
-"""Numbers that must stay positive: it is their logarithms that vary, so no bounds are needed."""
+"""Numbers that must stay positive: the vector has their logarithms, so no bounds are needed."""
 
 VELOCITY, VISCOSITY = "velocity", "fluid.viscosity"
+
+Address = tuple[str | int, ...]
+"""The attributes and indices that lead from a setup to numbers in it."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +34,16 @@ class Setup:
     """What is simulated: a fluid, the forces on it, and the velocity it begins with."""
 
     fluid: Fluid
-    """What the picture is made of."""
+    """The fluid."""
     forces: tuple[Force, ...]
-    """What moves it; groups are their forces."""
+    """The forces on it, with groups replaced by their forces."""
     velocity: np.ndarray
     """Velocity at the beginning [longer side/s], (2, ny, nx): u on the first nx x-faces, v on the first
-    ny y-faces. On walls it is 0, whatever is here."""
+    ny y-faces. Values on walls are ignored: there it is 0."""
 
     def number(self, name: str) -> object:
-        """What is under a name, such as "forces[0].vector"."""
-        return _follow(self, _path(name))
+        """The number or numbers with a name such as "forces[0].vector"."""
+        return _follow(self, address_of(name))
 
 
 @dataclass(frozen=True)
@@ -49,13 +55,13 @@ class Free:
     """
 
     name: str
-    """Where they are: "forces[0].vector", "forces[*].center", "forces[2].envelope.values",
+    """Their name: "forces[0].vector", "forces[*].center", "forces[2].envelope.values",
     "fluid.viscosity", "fluid.densities[0].sources[1].rate", "velocity"."""
     scale: float = 1.0
-    """What a change of one of the variable stands for: in the quantity's own unit; for radii, periods and
-    viscosities in their logarithm."""
+    """The change of the number for a change by 1 in the vector, in the number's unit; for radii, periods and
+    viscosities the change of the logarithm."""
     parts: Sequence[bool] | np.ndarray | None = None
-    """Which of several numbers may vary, as a mask of their shape; all by default."""
+    """A mask of the numbers' shape, True for those that may vary; all by default."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.scale) and self.scale > 0):
@@ -64,29 +70,31 @@ class Free:
 
 @dataclass(frozen=True, eq=False)
 class Slice:
-    """Where the numbers of one name are in the vector."""
+    """The part of the vector with the numbers of one name."""
 
     name: str
-    """As in `Free`, with every [*] filled in."""
+    """As in `Free`, with an index for every [*]."""
+    address: Address
+    """The same as an address."""
     entries: slice
-    """Of the vector."""
+    """Their entries in the vector."""
     shape: tuple[int, ...]
-    """Of the numbers, those that are fixed included."""
+    """Shape of the numbers, including the fixed ones."""
     scale: float
     """As in `Free`; of fields over the grid divided by the square root of a cell's area, so that the
     vector's inner product is the integral over the picture."""
     logarithm: bool
-    """Whether it is the logarithms that vary."""
+    """Whether the entries are logarithms."""
     mask: np.ndarray = field(repr=False)
-    """Which of them may vary."""
+    """True for numbers that may vary, others are fixed."""
 
-    def variable(self, values: np.ndarray) -> np.ndarray:
-        """The entries that stand for these numbers."""
+    def packed(self, values: np.ndarray) -> np.ndarray:
+        """The entries for these numbers."""
         values = values[self.mask]
         return (np.log(values) if self.logarithm else values) / self.scale
 
     def numbers(self, m: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-        """The numbers that the vector's entries stand for, with the fixed ones."""
+        """The numbers for the vector's entries, together with the fixed ones."""
         values, varying = np.array(fixed, dtype=np.float64), m[self.entries] * self.scale
         values[self.mask] = np.exp(varying) if self.logarithm else varying
         return values
@@ -110,26 +118,27 @@ class Variables:
         self._known = known_names(setup)
         self.slices: list[Slice] = []
         at = 0
-        if isinstance(free, Free) or not all(isinstance(one, Free) for one in free):
+        if isinstance(free, Free) or not all(isinstance(wanted, Free) for wanted in free):
             raise TypeError("free: expected a list of Free(name, …)")
-        for one in free:
-            for name in self._matching(one.name):
+        for wanted in free:
+            for name in self._matching(wanted.name):
                 if any(name == other.name for other in self.slices):
                     raise ValueError(f"{name} is free twice")
-                values = self._get(name)
-                mask = np.broadcast_to(True, values.shape) if one.parts is None else np.asarray(one.parts)
+                address = address_of(name)
+                values, parts = self._values(address), wanted.parts
+                mask = np.broadcast_to(True, values.shape) if parts is None else np.asarray(parts)
                 if mask.dtype != bool:
                     raise ValueError(f"{name}: parts are a mask of True and False, not of {mask.dtype}")
                 if mask.shape != values.shape:
                     raise ValueError(f"{name}: parts of shape {mask.shape}, expected {values.shape}")
-                logarithm = name.rpartition(".")[2] in POSITIVE
+                logarithm = address[-1] in POSITIVE
                 if logarithm and not np.all(values[mask] > 0):
                     raise ValueError(f"{name} begins at 0: give it a positive value to vary")
-                size, scale = int(mask.sum()), one.scale
+                size, scale = int(mask.sum()), wanted.scale
                 if values.ndim > 1 and values.shape[-2:] == (grid.ny, grid.nx):
                     scale /= math.sqrt(grid.hx * grid.hy)
                 entries = slice(at, at + size)
-                self.slices.append(Slice(name, entries, values.shape, scale, logarithm, mask))
+                self.slices.append(Slice(name, address, entries, values.shape, scale, logarithm, mask))
                 at += size
         self.size = at
         if not self.size:
@@ -139,26 +148,28 @@ class Variables:
     """Length of the vector."""
 
     def _matching(self, name: str) -> list[str]:
+        """The names that match one with [*]."""
         pattern = re.escape(name).replace(re.escape("[*]"), r"\[\d+\]")
         found = [known for known in self._known if re.fullmatch(pattern, known)]
         if not found:
             raise ValueError(f"{name} cannot vary here; there is: {', '.join(self._known) or 'nothing'}")
         return found
 
-    def has(self, name: str) -> bool:
-        """Whether a name, or one that begins with it, is free."""
-        return any(one.name == name or one.name.startswith((f"{name}.", f"{name}[")) for one in self.slices)
+    def has(self, address: Address) -> bool:
+        """Whether any number at an address, or below it, is free."""
+        return any(part.address[: len(address)] == address for part in self.slices)
 
-    def _get(self, name: str, setup: Setup | None = None) -> np.ndarray:
-        value = (setup or self.setup).number(name)
+    def _values(self, address: Address, setup: Setup | None = None) -> np.ndarray:
+        """The numbers at an address, on the grid if they are painted."""
+        value: Any = _follow(setup or self.setup, address)
         return np.array(value.sample(self.grid) if isinstance(value, Painted) else value, dtype=np.float64)
 
     def pack(self, setup: Setup | None = None) -> np.ndarray:
-        """The vector of a setup, which differs from the first in free numbers only; by default of that."""
-        return np.concatenate([one.variable(self._get(one.name, setup)) for one in self.slices])
+        """The vector for a setup, which differs from the first in free numbers only; by default for that."""
+        return np.concatenate([part.packed(self._values(part.address, setup)) for part in self.slices])
 
     def unpack(self, m: np.ndarray) -> Setup:
-        """The setup that a vector stands for.
+        """The setup for a vector.
 
         Raises:
             ValueError: not `size` finite numbers, with the name of the first that is not; or numbers that a
@@ -168,23 +179,23 @@ class Variables:
         if m.shape != (self.size,):
             raise ValueError(f"controls of shape {m.shape}: expected ({self.size},)")
         setup = self.setup
-        for one in self.slices:
-            if not np.all(np.isfinite(m[one.entries])):
-                raise ValueError(f"controls: {one.name} is not finite")
-            setup = _replaced(setup, _path(one.name), one.numbers(m, self._get(one.name)))
+        for part in self.slices:
+            if not np.all(np.isfinite(m[part.entries])):
+                raise ValueError(f"controls: {part.name} is not finite")
+            setup = _replaced(setup, part.address, part.numbers(m, self._values(part.address)))
         return setup
 
-    def pull_back(self, gradients: Mapping[str, np.ndarray], m: np.ndarray) -> np.ndarray:
-        """The gradient with respect to the vector at m, from those with respect to the numbers, by name."""
+    def pull_back(self, gradients: Mapping[Address, np.ndarray], m: np.ndarray) -> np.ndarray:
+        """The gradient with respect to the vector at m, from those with respect to the numbers."""
         out = np.zeros(self.size)
-        for one in self.slices:
-            values = one.numbers(m, self._get(one.name))
-            out[one.entries] = one.pull_back(np.asarray(gradients.get(one.name, 0.0)), values)
+        for part in self.slices:
+            values = part.numbers(m, self._values(part.address))
+            out[part.entries] = part.pull_back(np.asarray(gradients.get(part.address, 0.0)), values)
         return out
 
 
 def known_names(setup: Setup) -> list[str]:
-    """Everything of a setup that can vary."""
+    """The names of all numbers of a setup that can vary."""
     names = []
     for n, force in enumerate(setup.forces):
         names += [f"forces[{n}].{key}" for key in _slopes_of(force)]
@@ -196,42 +207,43 @@ def known_names(setup: Setup) -> list[str]:
     return [*names, VELOCITY]
 
 
-def _slopes_of(what: Any) -> list[str]:
-    """Names of the numbers that a force or a source has slopes with."""
-    if isinstance(what, PaintedSource):
-        return list(what.pull_back(0.0, 1.0, 0.0))
-    if isinstance(what, FieldForce):
-        return list(what.pull_back(0.0, 1.0, [0.0] * len(what.integrals(0.0, 1.0))))
-    if isinstance(what, Buoyancy):
-        return list(what.pull_back(0.0, 1.0, (0.0, 0.0)))
-    return list(what.pull_back(0.0, 1.0, GaussianImpulse((0.0, 0.0), 0.0)))
+def address_of(name: str) -> Address:
+    """The address for a name."""
+    return tuple(int(word) if word.isdigit() else word for word in re.findall(r"\w+", name))
 
 
-def _path(name: str) -> list[str | int]:
-    """The steps from a setup to a number: attributes and indices."""
-    return [int(word) if word.isdigit() else word for word in re.findall(r"\w+", name)]
+def _slopes_of(force: Any) -> list[str]:
+    """Names of the numbers of a force or a source for which its `pull_back` gives gradients."""
+    if isinstance(force, PaintedSource):
+        return list(force.pull_back(0.0, 1.0, 0.0))
+    if isinstance(force, FieldForce):
+        return list(force.pull_back(0.0, 1.0, [0.0] * len(force.integrals(0.0, 1.0))))
+    if isinstance(force, Buoyancy):
+        return list(force.pull_back(0.0, 1.0, (0.0, 0.0)))
+    return list(force.pull_back(0.0, 1.0, GaussianImpulse((0.0, 0.0), 0.0)))
 
 
-def _follow(thing: Any, path: Sequence[str | int]) -> Any:
-    for step in path:
-        thing = thing[step] if isinstance(step, int) else getattr(thing, step)
+def _follow(thing: Any, address: Address) -> Any:
+    """What is at an address within a thing."""
+    for key in address:
+        thing = thing[key] if isinstance(key, int) else getattr(thing, key)
     return thing
 
 
-def _replaced(thing: Any, path: Sequence[str | int], value: np.ndarray) -> Any:
-    """The same with another value at the end of the path."""
-    if not path:
+def _replaced(thing: Any, address: Address, value: np.ndarray) -> Any:
+    """A copy of a thing with another value at an address."""
+    if not address:
         return _like(thing, value)
-    step, rest = path[0], path[1:]
-    if isinstance(step, int):
-        return (*thing[:step], _replaced(thing[step], rest, value), *thing[step + 1 :])
-    if not is_dataclass(thing):
+    key, rest = address[0], address[1:]
+    if isinstance(key, int):
+        return (*thing[:key], _replaced(thing[key], rest, value), *thing[key + 1 :])
+    if isinstance(thing, type) or not is_dataclass(thing):
         raise TypeError(f"{type(thing).__name__} is no dataclass")
-    return replace(thing, **{step: _replaced(getattr(thing, step), rest, value)})
+    return replace(thing, **{key: _replaced(getattr(thing, key), rest, value)})  # type: ignore[type-var]
 
 
 def _like(old: Any, value: np.ndarray) -> Any:
-    """A value in the form of the old one."""
+    """A value as the type of the old one."""
     if isinstance(old, Painted):
         return Painted(value)
     if isinstance(old, np.ndarray):

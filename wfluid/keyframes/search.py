@@ -135,7 +135,7 @@ class Problem:
     device: str | None
     """Name of the device."""
     graphs: GraphCache
-    """Captured graphs, which one minimisation takes over from the one before."""
+    """Captured graphs, which each minimisation reuses from the previous one."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,6 +86,11 @@ class Fluid:
         return tuple(density.name for density in self.densities)
 
     @property
+    def boundary(self) -> Walls:
+        """`walls`, which a fluid turns into `Walls` when it is made."""
+        return Walls.parse(self.walls)
+
+    @property
     def uniform(self) -> bool:
         """Whether the viscosity is one constant number and there is no drag."""
         return isinstance(self.viscosity, float) and self.freeze is None
@@ -93,5 +98,5 @@ class Fluid:
     @property
     def separable(self) -> bool:
         """Whether the components of the velocity diffuse independently: uniform, and no no-slip wall."""
-        walls = Walls.parse(self.walls)
+        walls = self.boundary
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)

@@ -68,6 +68,9 @@ class Force(ABC):
 class LocalForce(Force):
     """A force with the shape of a Gaussian."""
 
+    radius: float
+    """Sigma of the Gaussian [longer side]."""
+
     @abstractmethod
     def impulse(self, start: float, end: float) -> GaussianImpulse:
         """The effect of the force from `start` to `end` [s]."""

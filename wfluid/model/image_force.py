@@ -63,9 +63,7 @@ class ImageForce(FieldForce):
         if self.kind != "vectors":
             values = Painted(self.picture).values
             if np.ptp(values) == 0:
-                raise ValueError(
-                    "ImageForce: the picture is constant and has no slopes: expected different intensities"
-                )
+                raise ValueError("ImageForce: the picture is the same everywhere, so it has no slopes")
         else:
             values = vectors_of(self.picture)
         object.__setattr__(self, "_values", values)

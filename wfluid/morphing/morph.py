@@ -7,9 +7,9 @@
 >>> write_animation("morph.gif", morph_of_two.frames(), fps=12)
 [PosixPath('morph.gif')]
 
-Keyframes take the points of the first picture a to those of the second, b, within the time of one flow. After
-a part of that time the first is seen through the flow's map to its start, the second through the map to its
-end: what corresponds lies at one place in both, and they are blended.
+Keyframes take the points of the first picture a to those of the second picture b within the time of one flow.
+At any time of the flow, a is warped by the map to the start and b by the map to the end. Corresponding points
+then coincide, and the two pictures are blended.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from enum import Enum
 from typing import Any
 
 SHORTEST_GROWTH, LONGEST_GROWTH = 1.1, 4.0
-"""Least and largest ratio of an advance to the one before, until the minimum is bracketed."""
+"""Least and largest ratio of consecutive advances until the minimum is bracketed."""
 
 CONTRACTION = 0.66
 """A bracket that two trials leave longer than this fraction of its length is halved."""

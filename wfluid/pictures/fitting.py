@@ -92,8 +92,7 @@ def stored(picture: Picture, fit: Fit) -> np.ndarray:
         numbers = np.empty(pixels.shape, dtype)
         numbers[..., colors] = _encoded(straight[..., colors], dtype, srgb, fit.profile)
     if fit.alpha is not None:
-        opacity = np.clip(pixels[..., fit.alpha], 0.0, 1.0)
-        numbers[..., fit.alpha] = color.encode(opacity, dtype, srgb=False)
+        numbers[..., fit.alpha] = color.encode(pixels[..., fit.alpha], dtype, srgb=False)
     return numbers
 
 
@@ -118,7 +117,7 @@ def display_notes(path: Path, picture: Picture) -> tuple[str, ...]:
 def color_channels(picture: Picture) -> tuple[int | None, ...]:
     """The channels of a picture that are red, green and blue, or grey; None is a colour that is not there.
 
-    The names of the channels tell them, such as "R" or "diffuse.R"; otherwise they are the first one or three.
+    The names of the channels tell them, such as "R" or "diffuse.R"; otherwise the first one or three.
     """
     others = picture.color_channels
     names = getattr(picture.metadata, "channelnames", ())

@@ -126,8 +126,9 @@ def intensity(picture: Picture) -> np.ndarray:
     checked = pixels if picture.profile is None else stored  # of wide colours, Rec. 709 values are negative
     wrong = ~np.isfinite(checked) | (checked < -_RINGING)
     if wrong.any():
+        value = checked[wrong].flat[0]
         raise PictureError(
-            f"a picture with the value {checked[wrong].flat[0]}: expected finite values from 0 on"
+            f"a picture with the value {value} has no intensity: expected finite values from 0 on"
         )
     colours = picture.color_channels[:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)

@@ -49,6 +49,8 @@ class Stored:
     """Index of the alpha channel."""
     straight: bool
     """Whether colours are not multiplied by alpha."""
+    integers: bool
+    """Whether the file holds integers, which are sRGB unless something else is known."""
     data: bool
     """Whether the numbers are no colours."""
     profile: Profile | None
@@ -80,7 +82,8 @@ def read_stored(path: Path, colorspace: str) -> Stored:
         if source is None:
             raise PictureError(f"{path}: not a picture that can be read ({first_line(_message(oiio))})")
         try:
-            page = _page(source, notes)
+            page = _page(source.format_name(), oiio.ImageInput.open(str(path)), notes)
+            source.seek_subimage(page, 0)
             spec = source.spec()
             _check(path, spec)
             dtype = _type_of(str(spec.format))
@@ -105,6 +108,7 @@ def read_stored(path: Path, colorspace: str) -> Stored:
     if alpha is not None and spec.nchannels == 1:
         alpha, data = None, True
         notes.append("it holds alpha alone, which is read as numbers, not as colours")
+    integers = dtype not in LINEAR or str(spec.format) in _WIDE
     straight = kind in STRAIGHT or bool(spec.get_int_attribute("oiio:UnassociatedAlpha"))
     if alpha is not None and kind in SPARE and not stored[..., alpha].any():
         stored, alpha = np.delete(stored, alpha, axis=2), None
@@ -112,28 +116,25 @@ def read_stored(path: Path, colorspace: str) -> Stored:
     colors = stored.shape[2] - (alpha is not None)
     profile = _profile(spec, colors, dtype, colorspace, notes)
     _forget(spec, kind, alpha)
-    return Stored(stored, dtype, alpha, straight, data, profile, spec, tuple(notes))
+    return Stored(stored, dtype, alpha, straight, integers, data, profile, spec, tuple(notes))
 
 
-def _page(source: Any, notes: list[str]) -> int:
-    """Turn to the picture of a file that is read: the largest page, the first frame; its index."""
-    kind = source.format_name()
-    if kind in ONE or not source.seek_subimage(1, 0):
-        source.seek_subimage(0, 0)
+def _page(kind: str, probe: Any, notes: list[str]) -> int:
+    """The index of the picture of a file that is read: the largest page, or the first frame.
+
+    `probe` is the file opened once more: some readers do not turn back from the second picture to the first.
+    """
+    if kind in ONE or probe is None or not probe.seek_subimage(1, 0):
         return 0
     if kind not in PAGES:
-        source.seek_subimage(0, 0)
         notes.append("the first of several pictures in the file is read, without the others")
         return 0
     sizes = []
-    while source.seek_subimage(len(sizes), 0):
-        sizes.append((source.spec().width, source.spec().height))
+    while probe.seek_subimage(len(sizes), 0):
+        sizes.append((probe.spec().width, probe.spec().height))
     page = max(range(len(sizes)), key=lambda n: sizes[n][0] * sizes[n][1])
-    source.seek_subimage(page, 0)
     width, height = sizes[page]
-    notes.append(
-        f"picture {page + 1} of {len(sizes)} in the file, {width} x {height} pixels, is read: the largest"
-    )
+    notes.append(f"picture {page + 1} of {len(sizes)} in it, {width} x {height} pixels, is read: the largest")
     return page
 
 

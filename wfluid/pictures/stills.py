@@ -63,7 +63,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     check_word("colorspace", colorspace, COLORSPACES, PictureError)
     read = read_stored(path, colorspace)
     data = read.data or colorspace == "data"
-    srgb = colorspace == "srgb" or (colorspace == "auto" and read.dtype not in LINEAR and not data)
+    srgb = colorspace == "srgb" or (colorspace == "auto" and read.integers and not data)
     pixels = _linear(read, srgb)
     if exact and not np.isfinite(pixels).all():
         raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
@@ -118,10 +118,10 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
 
     The number type is that of the picture if the format supports it, otherwise the default of the format;
     values are clamped to its range. Channels that the format does not support are dropped; without alpha the
-    picture is over the encoding's background. Grey becomes colours where a format has only those. Metadata are
-    kept, an ICC profile in integer files of formats that have one; otherwise numbers are sRGB, or linear with
-    the primaries of Rec. 709. EXR files keep display and data windows, in proportion to their size; other
-    formats show the display window.
+    picture is over the encoding's background. Grey becomes colours where a format has only those. Metadata
+    are kept, an ICC profile in integer files of formats that have one; otherwise numbers are sRGB, or linear
+    with the primaries of Rec. 709. EXR files keep display and data windows, in proportion to their size;
+    other formats show the display window.
 
     Raises:
         PictureError: an unknown format, an unsupported setting, or a file that cannot be written.

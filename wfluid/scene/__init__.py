@@ -1,1 +1,1 @@
-"""What a scene file says, and how it is checked."""
+"""Scene files: their tables and keys, reading, checking and writing."""

@@ -1,4 +1,4 @@
-"""Nested dictionaries, as TOML gives them, checked against what a scene may say and made into its tables."""
+"""Nested dictionaries, as TOML has them, checked against the tables of a scene and made into objects."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from wfluid.scene.types import nearest
 
 
 def checked(what: Part, value: Any, path: tuple = ()) -> Any:
-    """The value as plain dictionaries and lists, with what each key's check makes of it.
+    """The value as plain dictionaries and lists, each value of a key in its stored form.
+
+    `path` leads to the value.
 
     Raises:
-        SchemaError: the first key that is wrong.
+        SchemaError: the first wrong key.
     """
     if isinstance(what, Key):
         try:
@@ -54,8 +56,8 @@ def _without_kind(value: Mapping) -> dict:
 def _checked_keys(what: Table, value: Mapping, path: tuple) -> dict:
     for name in value:
         if name not in what.keys:
-            there = f"; there is {', '.join(what.keys)}" if what.keys else ""
-            raise SchemaError((*path, name), f"no such key{nearest(name, list(what.keys)) or there}")
+            known = f"; expected one of {', '.join(what.keys)}" if what.keys else ""
+            raise SchemaError((*path, name), f"no such key{nearest(name, list(what.keys)) or known}")
     for name, one in what.keys.items():
         if isinstance(one, Key) and one.required and name not in value:
             raise SchemaError(path, f"{name} is missing: {one.meaning}")
@@ -76,7 +78,7 @@ def _refuse_twins(name: str, found: Sequence[Mapping], path: tuple) -> None:
 
 
 def made(what: Part, value: Any) -> Any:
-    """The objects of a checked value: tables as their classes, arrays as tuples."""
+    """The objects of a checked value: tables become their classes, arrays become tuples."""
     if isinstance(what, Key):
         return _as_tuples(value)
     if isinstance(what, ArrayOf):
@@ -89,7 +91,7 @@ def made(what: Part, value: Any) -> Any:
 
 
 def attributes_of(what: Table, value: Mapping) -> dict[str, Any]:
-    """The attributes of the object that a checked table makes."""
+    """The attributes of a checked table's object."""
     return {what.attributes[name]: made(what.keys[name], item) for name, item in value.items()}
 
 
@@ -98,7 +100,7 @@ def _as_tuples(value: Any) -> Any:
 
 
 def parts(what: Part, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Part, Any]]:
-    """Every part of a checked value: its path, what it is, and its value."""
+    """Every part of a checked value: its path, its definition and its value."""
     yield path, what, value
     if isinstance(what, ArrayOf | MapOf):
         items = enumerate(value) if isinstance(what, ArrayOf) else value.items()
@@ -112,7 +114,7 @@ def parts(what: Part, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Par
 
 
 def replaced(what: Part, value: Any, change: Callable[[Key, Any], Any]) -> Any:
-    """The checked value with what `change` makes of each value of a key."""
+    """The checked value, with `change` applied to the value of every key."""
     if isinstance(what, Key):
         return change(what, value)
     if isinstance(what, ArrayOf):
@@ -126,5 +128,5 @@ def replaced(what: Part, value: Any, change: Callable[[Key, Any], Any]) -> Any:
 
 
 def keys_of(what: Table | Union, value: Mapping) -> Mapping[str, Part]:
-    """The keys that a table may have, but for its kind."""
+    """The keys of a table, except for `kind`."""
     return (what.tables[value["kind"]] if isinstance(what, Union) else what).keys

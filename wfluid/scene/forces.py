@@ -18,13 +18,13 @@ SIZE = numbers(2, "two numbers, [width, height]")
 PATH = rows(3, 2, "two rows or more of [seconds, x, y]")
 
 SEED_LIMIT = 2**32 - 1
-"""Largest seed of random numbers."""
+"""Largest random seed."""
 
 PHASE = 0.25
-"""Part of a period that an oscillation is ahead where nothing says it: it swings about the place."""
+"""Default phase of an oscillation, a part of a period: the motion is centred on the place."""
 
 LOOP_PHASE = 0.5
-"""The same in an oscillating loop, where the flow has swung before."""
+"""Default phase in an oscillating loop, which starts in the middle of the motion."""
 
 
 def _share(part: float) -> str:
@@ -32,100 +32,98 @@ def _share(part: float) -> str:
 
 
 class Window(SceneTable):
-    """When something begins and ends."""
+    """The window of time."""
 
     trailing = True
-    start: float = key("when it begins", number(0), unit="s", default=0.0)
-    end: float | None = key("when it ends", number(above=0), unit="s", otherwise="the end")
+    start: float = key("start of the window", number(0), unit="s", default=0.0)
+    end: float | None = key("end of the window", number(above=0), unit="s", otherwise="the end")
 
 
-class Blow(SceneTable):
-    """One blow."""
+class Impulse(SceneTable):
+    """The time of an impulse."""
 
     trailing = True
-    at: float | None = key("one blow at that time, instead of a window", number(0), unit="s")
+    at: float | None = key("one impulse at this time, instead of a window", number(0), unit="s")
 
 
 class Wave(SceneTable):
     """An oscillation."""
 
     trailing = True
-    period: float | None = key("oscillate with that period", number(LEAST_TIME), unit="s")
+    period: float | None = key("period of an oscillation", number(LEAST_TIME), unit="s")
     phase: float | None = key(
-        "part of a period it is ahead: 0.25 swings about the place, 0 is the paper's sine",
+        "phase, a part of a period: 0.25 centres the motion on the place, 0 is the paper's sine",
         number(),
         otherwise=f"{PHASE:g}; in an oscillating loop {LOOP_PHASE:g}",
     )
 
 
 class Ramps(SceneTable):
-    """Smooth ends."""
+    """Smooth ends of the window."""
 
     trailing = True
-    rise: float = key("time over which it grows to its strength", number(0), unit="s", default=0.0)
-    fall: float = key("time over which it ceases before its end", number(0), unit="s", default=0.0)
+    rise: float = key("time of the smooth increase at the start", number(0), unit="s", default=0.0)
+    fall: float = key("time of the smooth decrease at the end", number(0), unit="s", default=0.0)
 
 
 class Factor(SceneTable):
-    """What multiplies it."""
+    """Factors."""
 
     trailing = True
-    strength: float = key("factor", number(), default=1.0)
-    envelope: tuple[str, ...] = key("further envelopes that it is multiplied by", names(), default=())
+    strength: float = key("factor on the strength", number(), default=1.0)
+    envelope: tuple[str, ...] = key("named envelopes that multiply the strength", names(), default=())
 
 
-class Timing(Factor, Ramps, Wave, Blow, Window):
-    """When a force acts."""
+class Timing(Factor, Ramps, Wave, Impulse, Window):
+    """The timing of a force."""
 
     trailing = True
 
 
 class Label(SceneTable):
-    """What a force is called."""
+    """The name of a force."""
 
     trailing = True
-    name: str | None = key("what it is called, for --set", text())
-    group: str | None = key("the group it belongs to", text())
+    name: str | None = key("name, for --set", text())
+    group: str | None = key("name of its group", text())
 
 
 class Masked(SceneTable):
-    """Where a force acts."""
+    """The mask of a force."""
 
     trailing = True
-    mask: str | None = file_key(
-        "acts where this picture is white, instead of the scene's effect mask",
-    )
+    mask: str | None = file_key("mask, white where the force acts; replaces the effect mask")
 
 
 class Spot(SceneTable):
     """A place with a radius."""
 
-    center: Point | None = key("where it acts", POINT, unit="px")
-    path: tuple[Row, ...] | None = key("where it acts over time, instead of center", PATH, unit="s, px")
-    radius: float | None = key("sigma of its Gaussian", number(above=0), unit="px", otherwise=_share(RADIUS))
+    center: Point | None = key("centre", POINT, unit="px")
+    path: tuple[Row, ...] | None = key("path of a moving centre, instead of center", PATH, unit="s, px")
+    radius: float | None = key("sigma of the Gaussian", number(above=0), unit="px", otherwise=_share(RADIUS))
 
 
 class PushTable(Masked, Timing, Label, Spot):
     """A push along an arrow."""
 
     kind = "push"
-    by: Point = key("the arrow: how far it carries its centre", POINT, unit="px", required=True)
+    by: Point = key("displacement of the centre", POINT, unit="px", required=True)
 
 
 class VortexTable(Masked, Timing, Label, Spot):
     """A twirl, clockwise for positive angles."""
 
     kind = "vortex"
-    turn: float = key("how far it turns its centre", number(), unit="degrees", required=True)
+    turn: float = key("rotation of the centre", number(), unit="degrees", required=True)
 
 
 class GrowTable(Masked, Factor, Ramps, Wave, Window, Label, Spot):
-    """Growing, or shrinking, with a ring around that gives way; not where it is frozen."""
+    """Growth, or shrinking, compensated in a ring around it; not in frozen parts."""
 
     kind = "grow"
-    factor: float = key("how many times as long the centre becomes", number(0.05, 20), required=True)
+    factor: float = key("factor on lengths at the centre", number(0.05, 20), required=True)
     phase: float = key(
-        "part of a period it is ahead: 0.25 swings about the place, 0 is the paper's sine",
+        "phase, a part of a period: 0.25 centres the motion on the place, 0 is the paper's sine",
         number(),
         default=PHASE,
     )
@@ -136,24 +134,24 @@ class StrokeTable(Masked, Label, Factor, Window):
 
     kind = "stroke"
     points: tuple[Point, ...] | None = key(
-        "the line", rows(2, 2, "two points or more, [[x, y], …]"), unit="px"
+        "points of the line", rows(2, 2, "two points or more, [[x, y], …]"), unit="px"
     )
-    path: tuple[Row, ...] | None = key("the line with its times, instead of points", PATH, unit="s, px")
-    radius: float | None = key("sigma of its Gaussian", number(above=0), unit="px", otherwise=_share(RADIUS))
+    path: tuple[Row, ...] | None = key("points of the line with times, instead of points", PATH, unit="s, px")
+    radius: float | None = key("sigma of the Gaussian", number(above=0), unit="px", otherwise=_share(RADIUS))
 
 
 class WindTable(Masked, Timing, Label):
-    """One push everywhere; moves something along periodic walls, or under a mask."""
+    """A uniform push; moves the picture only with periodic walls or a mask."""
 
     kind = "wind"
-    by: Point = key("how far it carries", POINT, unit="px", required=True)
+    by: Point = key("displacement", POINT, unit="px", required=True)
 
 
 class NoiseTable(Masked, Timing, Label):
     """Turbulence: random eddies."""
 
     kind = "noise"
-    amount: float = key("how far it carries, root mean square", number(), unit="px", required=True)
+    amount: float = key("displacement, root mean square", number(), unit="px", required=True)
     scale: float | None = key(
         "mean wavelength, up to twice the longer side",
         number(above=0),
@@ -161,31 +159,33 @@ class NoiseTable(Masked, Timing, Label):
         otherwise=_share(NOISE_SCALE),
     )
     seed: int | None = key(
-        "which noise", whole(0, SEED_LIMIT), otherwise="the scene's, and the force's number"
+        "random seed", whole(0, SEED_LIMIT), otherwise="the scene's plus the number of the force"
     )
-    change: float | None = key("time in which it changes and comes back", number(LEAST_TIME), unit="s")
+    change: float | None = key(
+        "period after which the noise repeats", number(LEAST_TIME), unit="s", otherwise="constant"
+    )
 
 
 class ImageTable(Masked, Timing, Label):
-    """A force from a picture, or from the animated one, self."""
+    """A force from a picture; self is the animated one."""
 
     kind = "image"
     file: str = file_key("the picture", required=True)
-    along: str = key("what it follows", word(*IMAGE_FORCES), default=IMAGE_FORCES[0])
+    along: str = key("direction of the force", word(*IMAGE_FORCES), default=IMAGE_FORCES[0])
     amount: float | None = key(
-        "how far its strongest place is carried", number(), unit="px", otherwise=_share(IMAGE_LENGTH)
+        "displacement where the force is strongest", number(), unit="px", otherwise=_share(IMAGE_LENGTH)
     )
     radius: float | None = key(
-        "blur before slopes are taken", number(0), unit="px", otherwise=_share(IMAGE_BLUR)
+        "sigma of the blur before the gradient", number(0), unit="px", otherwise=_share(IMAGE_BLUR)
     )
 
 
 class BuoyancyTable(Timing, Label):
-    """A density's own push."""
+    """A push by a density, in proportion to it."""
 
     kind = "buoyancy"
     density: str = key("name of the density", text(), required=True)
-    by: Point = key("how far it carries where the density is 1", POINT, unit="px", required=True)
+    by: Point = key("displacement where the density is 1", POINT, unit="px", required=True)
 
 
 FORCE_CLASSES = (
@@ -201,21 +201,21 @@ FORCE_CLASSES = (
 ForceTable = (
     PushTable | VortexTable | GrowTable | StrokeTable | WindTable | NoiseTable | ImageTable | BuoyancyTable
 )
-FORCES = union("What moves it", *FORCE_CLASSES)
-"""Forces, by the key `kind`."""
+FORCES = union("Forces", *FORCE_CLASSES)
+"""The forces, by the key `kind`."""
 
 TIMING_KEYS = tuple(table_of(Timing).keys)
-"""Keys that say when a force acts."""
+"""Keys of a force's timing."""
 
 
 class ConstantTable(Window):
-    """1 in a window."""
+    """1 in a window, else 0."""
 
     kind = "constant"
 
 
 class FadeTable(Ramps, Window):
-    """1 in a window, with smooth ends."""
+    """1 in a window with smooth ends, else 0."""
 
     kind = "fade"
 
@@ -224,17 +224,19 @@ class OscillatorTable(Wave, Window):
     """A sine."""
 
     kind = "oscillator"
-    period: float = key("its period", number(LEAST_TIME), unit="s", required=True)
+    period: float = key("period", number(LEAST_TIME), unit="s", required=True)
 
 
 class SamplesTable(SceneTable):
-    """Straight lines between values."""
+    """Linear interpolation between values."""
 
     kind = "samples"
-    times: tuple[float, ...] = key("when", rows(1, 2, "two numbers or more"), unit="s", required=True)
-    values: tuple[float, ...] = key("factors", rows(1, 2, "two numbers or more"), required=True)
+    times: tuple[float, ...] = key(
+        "times of the values", rows(1, 2, "two numbers or more"), unit="s", required=True
+    )
+    values: tuple[float, ...] = key("values", rows(1, 2, "two numbers or more"), required=True)
 
 
 EnvelopeTable = ConstantTable | FadeTable | OscillatorTable | SamplesTable
-ENVELOPES = union("A course in time with a name", ConstantTable, FadeTable, OscillatorTable, SamplesTable)
-"""Envelopes, by the key `kind`."""
+ENVELOPES = union("Named envelopes", ConstantTable, FadeTable, OscillatorTable, SamplesTable)
+"""The envelopes, by the key `kind`."""

@@ -1,7 +1,7 @@
 """The keys of a scene file. Lengths are pixels of the frame that `picture.size` names, times seconds.
 
-A field is everything that there is to say of a key: the reader, its refusals, the reference that
-`wfluid render --keys` prints, the flags of the command line and their defaults all come from here.
+A field defines everything about a key: the reader, its error messages, the reference that `wfluid render
+--keys` prints, the flags of the command line and their defaults all come from here.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ from wfluid.scene.forces import (
     POINTS,
     SEED_LIMIT,
     SIZE,
-    Blow,
     EnvelopeTable,
     Factor,
     ForceTable,
+    Impulse,
     Point,
     Ramps,
     Spot,
@@ -64,72 +64,73 @@ if TYPE_CHECKING:
     from wfluid.pictures.formats import Encoding
 
 VERSION = 1
-"""Of the format that this file describes."""
+"""Version of the format that this file describes."""
 
 DURATION = 2.0
-"""Length of a scene that names none, and whose keyframes name no time [s]."""
+"""Default length of a scene without timed keyframes [s]."""
 
 SELF = "self"
-"""What stands for the animated picture where a painting is named."""
+"""The animated picture, in place of the name of a file."""
 
-_OF_POINTS = "a morph goes without: its flow follows from its points"
-_OF_STEPS = "a morph goes without: its flow has steps of its own"
-_OF_LOOPS = "a morph goes without: set pingpong of [morph]"
+_OF_POINTS = "not allowed in a morph: its points define the flow"
+_OF_STEPS = "not allowed in a morph: its flow has fixed steps"
+_OF_LOOPS = "not allowed in a morph: set pingpong of [morph]"
 
 _AREA = "longer side^2/s"
-_WHITE = "viscosity, or that of the image's white"
+_WHITE = "kinematic viscosity; with an image, that of white"
 
 
 class PictureTable(SceneTable):
-    """What is animated."""
+    """The animated picture."""
 
-    file: str = file_key("the picture", painting=False, required=True, form="PICTURE")
+    file: str = file_key("file of the picture", painting=False, required=True, form="PICTURE")
     size: Point | None = key(
-        "width and height that the scene's pixels refer to", SIZE, unit="px", otherwise="the picture's"
+        "size of the frame that the scene's pixels refer to", SIZE, unit="px", otherwise="the picture's"
     )
     colorspace: str = key(
-        "colour space of its numbers", word(*COLORSPACES), default=COLORSPACES[0], flag="--colorspace"
+        "colour space of the pixel values", word(*COLORSPACES), default=COLORSPACES[0], flag="--colorspace"
     )
 
 
 class FluidTable(SceneTable):
-    """How the fluid is computed."""
+    """The fluid and its solver."""
 
     cells: int = key(
         "cells along the longer side", whole(LEAST_CELLS, CELLS_LIMIT), default=CELLS, flag="--cells"
     )
     walls: str = key(
-        f"{', '.join(WALLS)}, or two of them as x,y",
+        f"boundary condition: {', '.join(WALLS)}, or two of them as x,y",
         text(),
         default=WALLS[0],
         flag="--walls",
     )
     scheme: str = key(
-        "numerical scheme (paper: Euler, bilinear, Jacobi, phase 0)",
+        "numerical scheme; paper is Euler, bilinear, Jacobi, phase 0",
         word(*SCHEMES),
         default=SCHEMES[0],
         flag="--scheme",
     )
     solver: str | None = key(
-        "solver of pressure and diffusion", word(*SOLVERS), otherwise="by scheme", flag="--solver"
+        "solver of pressure and diffusion",
+        word(*SOLVERS),
+        otherwise="multigrid, with the scheme paper jacobi",
+        flag="--solver",
     )
     pressure_cycles: int = key(
-        "multigrid cycles a projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
+        "multigrid cycles per projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
     )
 
 
 class ViscosityKeyTable(SceneTable):
-    """A viscosity at a time, instead of value and image; between them straight lines."""
+    """A viscosity at a time, instead of value and image; linear interpolation between times."""
 
-    time: float = key("when", number(0), unit="s", required=True)
+    time: float = key("time", number(0), unit="s", required=True)
     value: float = key(_WHITE, number(0, VISCOSITY_LIMIT), unit=_AREA, required=True)
-    image: str | None = file_key(
-        "stiff where this picture is bright",
-    )
+    image: str | None = file_key("picture, bright where the fluid is stiff")
 
 
 class ViscosityTable(SceneTable):
-    """How stiff it is."""
+    """The viscosity of the fluid."""
 
     value: float | None = key(
         _WHITE,
@@ -140,77 +141,81 @@ class ViscosityTable(SceneTable):
         flag="--viscosity",
     )
     image: str | None = file_key(
-        "a picture, bright where the fluid is stiff; self is the animated one",
+        "picture, bright where the fluid is stiff; self is the animated one",
         flag="--viscosity-image",
         metavar="FILE|self",
     )
     floor: float = key(
-        "viscosity of the image's black",
+        "viscosity of black in the image",
         number(0, VISCOSITY_LIMIT),
         unit=_AREA,
         default=0.0,
         flag="--viscosity-floor",
     )
-    invert: bool = key("stiff where the image is dark", flag(), default=False, flag="--invert-viscosity")
-    moves: bool = key("whether it moves with the picture", flag(), default=False, flag="--viscosity-moves")
+    invert: bool = key(
+        "make the fluid stiff where the image is dark", flag(), default=False, flag="--invert-viscosity"
+    )
+    moves: bool = key("move the viscosity with the picture", flag(), default=False, flag="--viscosity-moves")
     keys: tuple[ViscosityKeyTable, ...] = array(ViscosityKeyTable, name="key")
 
 
 class FreezeTable(SceneTable):
-    """What stays in its place."""
+    """Frozen parts of the picture."""
 
-    mask: str = file_key("white stays, by degrees", required=True)
+    mask: str = file_key("mask: white stays in place, grey partly", required=True)
     strength: float = key(
-        "drag of white", number(0, DRAG_LIMIT), unit="1/s", default=DRAG, form="--freeze MASK:strength"
+        "drag of white in the mask",
+        number(0, DRAG_LIMIT),
+        unit="1/s",
+        default=DRAG,
+        form="--freeze MASK:strength",
     )
 
 
 class EffectTable(SceneTable):
-    """Where forces act."""
+    """The mask of forces without their own."""
 
-    mask: str = file_key("forces act where it is white", required=True, flag="--effect-mask", metavar="MASK")
+    mask: str = file_key("mask, white where forces act", required=True, flag="--effect-mask", metavar="MASK")
 
 
 class TimeTable(SceneTable):
-    """When frames are shown."""
+    """Duration, frame rate and loop."""
 
     duration: float | None = key(
         "length of the animation",
         number(above=0),
         unit="s",
-        otherwise=f"that of the last keyframe, or {DURATION:g}",
+        otherwise=f"the time of the last keyframe, or else {DURATION:g}",
         flag="--duration",
     )
-    fps: float = key("frames a second", number(LEAST_FPS, FPS_LIMIT), default=SCENE_FPS, flag="--fps")
+    fps: float = key("frame rate", number(LEAST_FPS, FPS_LIMIT), unit="1/s", default=SCENE_FPS, flag="--fps")
     substeps: int | None = key(
-        "steps a frame",
+        "time steps per frame",
         whole(1, SUBSTEPS_LIMIT),
         otherwise=f"steps of at most 1/{STEPS_PER_SECOND} s, with keyframes 1/{KEYFRAME_STEPS} s",
         flag="--substeps",
         not_in_morph=_OF_STEPS,
     )
     loop: str | None = key(
-        "how the end meets the beginning",
+        "way to close a loop",
         word(*LOOPS),
-        otherwise="not at all",
+        otherwise="no loop",
         flag="--loop",
         not_in_morph=_OF_LOOPS,
     )
 
 
 class FramesTable(SceneTable):
-    """What they look like."""
+    """Size and look-up of the frames."""
 
     width: int | None = key(
         "width of the frames", whole(1, SIZE_LIMIT), unit="px", otherwise="the picture's", flag="--width"
     )
     scale: float | None = key(
-        "size of the frames as a factor, instead of width", number(above=0), flag="--scale"
+        "factor on the size of the picture, instead of width", number(above=0), flag="--scale"
     )
-    filter: str = key(
-        "interpolation between the picture's pixels", word(*FILTERS), default=FILTER, flag="--filter"
-    )
-    edge: str = key("what lies beyond the picture's edges", word(*EDGES), default=EDGE, flag="--edge")
+    filter: str = key("interpolation between pixels", word(*FILTERS), default=FILTER, flag="--filter")
+    edge: str = key("values beyond the edges of the picture", word(*EDGES), default=EDGE, flag="--edge")
     background: str | None = key(
         "colour behind a transparent picture in outputs without alpha: GIF, movies, JPEG, HDR, BMP",
         color(),
@@ -220,78 +225,80 @@ class FramesTable(SceneTable):
 
 
 class GroupTable(SceneTable):
-    """Forces edited as one."""
+    """A group of forces."""
 
-    name: str = key("what it is called", text(), required=True)
-    strength: float = key("factor on all", number(), default=1.0)
-    envelope: tuple[str, ...] = key("envelopes that all are multiplied by", names(), default=())
+    name: str = key("name of the group", text(), required=True)
+    strength: float = key("factor on the strength of all", number(), default=1.0)
+    envelope: tuple[str, ...] = key("named envelopes that multiply the strength of all", names(), default=())
 
 
-class SourceTable(Factor, Ramps, Blow, Window, Spot):
-    """What pours a density in: a spot, or a picture."""
+class SourceTable(Factor, Ramps, Impulse, Window, Spot):
+    """A source of a density: a spot, or a picture."""
 
-    image: str | None = file_key(
-        "pours where this picture is bright, instead of a spot",
-    )
+    image: str | None = file_key("picture, bright where the source is strong, instead of a spot")
     amount: float = key(
-        "density poured in all, at the brightest place", number(-AMOUNT_LIMIT, AMOUNT_LIMIT), default=1.0
+        "total density that the source adds where it is strongest",
+        number(-AMOUNT_LIMIT, AMOUNT_LIMIT),
+        default=1.0,
     )
 
 
 class DensityTable(SceneTable):
-    """Something dissolved in it, seen over the picture."""
+    """A density dissolved in the fluid and shown over the picture."""
 
-    name: str = key("what it is called", text(), required=True)
-    color: str | None = key("its colour", color(), otherwise=INK_CODE)
-    look: str = key("colours, or covers", word(*LOOKS), default=LOOKS[0])
-    diffusion: float = key("how fast it spreads", number(0, VISCOSITY_LIMIT), unit=_AREA, default=0.0)
-    image: str | None = file_key(
-        "there at the beginning where this picture is bright",
-    )
-    amount: float = key("density of the image's white", number(0, AMOUNT_LIMIT), default=1.0)
+    name: str = key("name of the density", text(), required=True)
+    color: str | None = key("colour", color(), otherwise=INK_CODE)
+    look: str = key("look: ink colours the picture, smoke covers it", word(*LOOKS), default=LOOKS[0])
+    diffusion: float = key("diffusion coefficient", number(0, VISCOSITY_LIMIT), unit=_AREA, default=0.0)
+    image: str | None = file_key("picture of the density at the start, bright where it is large")
+    amount: float = key("density of white in the image", number(0, AMOUNT_LIMIT), default=1.0)
     sources: tuple[SourceTable, ...] = array(SourceTable, name="source")
 
 
 class LayerTable(SceneTable):
-    """A picture or matte that goes through the same map."""
+    """Another picture or matte, warped by the same map."""
 
-    name: str = key("what it is called", text(), required=True)
-    file: str = file_key("the picture, stretched over the animated one", painting=False, required=True)
+    name: str = key("name of the layer", text(), required=True)
+    file: str = file_key(
+        "file of the picture, stretched over the animated one", painting=False, required=True
+    )
     data: bool | None = key(
-        "whether its numbers are data, not colours", flag(), otherwise="true for one channel"
+        "true if the pixel values are data, not colours", flag(), otherwise="true for one channel"
     )
 
 
 class TracksTable(SceneTable):
-    """Points that are followed."""
+    """Followed points."""
 
-    points: tuple[Point, ...] = key("where they begin", POINTS, unit="px", default=(), form="--track")
+    points: tuple[Point, ...] = key("places at the start", POINTS, unit="px", default=(), form="--track")
 
 
 class OutputTable(SceneTable):
-    """What is written."""
+    """A file that is written."""
 
     file: str = file_key(
-        "x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report",
+        "name: x.gif, x.mp4, x.####.png, …; x.csv for tracks, x.json for the report",
         painting=False,
         required=True,
     )
-    of: str = key("picture, tracks, report, or the name of a layer or density", text(), default="picture")
+    of: str = key(
+        "contents: picture, tracks, report, or the name of a layer or density", text(), default="picture"
+    )
     start: int = key(
-        "number of a sequence's first frame", whole(0, 10**9), default=FIRST_FRAME, flag="--start"
+        "number of the first frame of a sequence", whole(0, 10**9), default=FIRST_FRAME, flag="--start"
     )
     type: str | None = key(
-        "number type of a sequence", word(*TYPES), otherwise="the picture's", flag="--type"
+        "number type of the stills of a sequence", word(*TYPES), otherwise="the picture's", flag="--type"
     )
     compression: str | None = key("compression of EXR and TIFF sequences", text(), flag="--compression")
     quality: int | None = key("quality of JPEG and WebP sequences", whole(1, QUALITY_LIMIT), flag="--quality")
 
     @property
     def encoding(self) -> Encoding:
-        """How stills are written.
+        """The encoding of stills.
 
         Raises:
-            PictureError: a value that no format has.
+            PictureError: a value that no format supports.
         """
         from wfluid.pictures.formats import Encoding
 
@@ -303,7 +310,10 @@ class SceneTables(SceneTable):
 
     wfluid: int = key("version of the format", version(VERSION), required=True)
     seed: int = key(
-        "seed of noises that name none, and of keyframes", whole(0, SEED_LIMIT), default=0, flag="--seed"
+        "random seed of keyframes, and of noises without their own",
+        whole(0, SEED_LIMIT),
+        default=0,
+        flag="--seed",
     )
     picture: PictureTable = optional(PictureTable)
     fluid: FluidTable = table(FluidTable)
@@ -326,4 +336,4 @@ class SceneTables(SceneTable):
 
 
 SCENE = table_of(SceneTables)
-"""Everything a scene may say."""
+"""The table of a scene, with all its keys."""

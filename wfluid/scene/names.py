@@ -1,4 +1,4 @@
-"""Names within a scene: of groups, envelopes, densities, layers; and what a morph goes without."""
+"""Checks of names within a scene, and of keys that a morph does not allow."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from wfluid.scene.schema import SchemaError, Table
 from wfluid.scene.types import nearest
 
 SHOWN = ("picture", "tracks", "report")
-"""What an output may be of, beside layers and densities."""
+"""Contents of an output, besides layers and densities."""
 
 
 def check_names(scene: SceneTables) -> None:
-    """Refuse names that nothing has, and what does not go together.
+    """Refuse unknown names of groups, envelopes, densities and layers, and ambiguous ones.
 
     Raises:
-        SchemaError: with the key.
+        SchemaError: with the path of the key.
     """
     if scene.picture is None:
-        raise SchemaError((), "[picture] is missing: what is animated")
+        raise SchemaError((), "[picture] is missing: give the file of the animated picture")
     groups, layers, densities = (
         [one.name for one in tables] for tables in (scene.groups, scene.layers, scene.densities)
     )
@@ -36,18 +36,21 @@ def check_names(scene: SceneTables) -> None:
     for n, name in enumerate([*layers, *densities]):
         kind, index = ("layer", n) if n < len(layers) else ("density", n - len(layers))
         if name in SHOWN or name in [*layers, *densities][:n]:
-            raise SchemaError((kind, index, "name"), f"{name!r} is taken: outputs could not tell them apart")
+            raise SchemaError(
+                (kind, index, "name"),
+                f"{name!r} is taken: give layers and densities different names, as outputs use them",
+            )
     for n, output in enumerate(scene.outputs):
         _check_known(("output", n, "of"), output.of, [*SHOWN, *layers, *densities])
         if output.of == "tracks" and not scene.tracks.points:
-            raise SchemaError(("output", n, "of"), "no point is followed: give [tracks] points")
+            raise SchemaError(("output", n, "of"), "there are no points to follow: give [tracks] points")
 
 
 def check_morph(tables: Mapping[str, Any]) -> None:
-    """Refuse what a morph has no use for.
+    """Refuse keys that a morph does not allow, and a morph without points.
 
     Raises:
-        SchemaError: with the key.
+        SchemaError: with the path of the key.
     """
     keyframes = tables.get("keyframes", {})
     if not (keyframes.get("move") or "points" in keyframes):
@@ -60,11 +63,12 @@ def check_morph(tables: Mapping[str, Any]) -> None:
 
 def _check_known(path: tuple, name: str | None, known: Sequence[str]) -> None:
     if name is not None and name not in known:
-        there = f"there is {', '.join(known)}" if known else "there is none"
-        raise SchemaError(path, f"{name!r}: no such {path[-1]}; {there}{nearest(name, known)}")
+        expected = f"expected one of {', '.join(known)}" if known else "the scene has none"
+        raise SchemaError(path, f"{name!r}: no such {path[-1]}; {expected}{nearest(name, known)}")
 
 
 def _uses_of_envelopes(scene: SceneTables) -> Iterator[tuple[tuple, Sequence[str]]]:
+    """The path and the names of every key that names envelopes."""
     for kind, tables in (("force", scene.forces), ("group", scene.groups)):
         for n, one in enumerate(tables):
             yield (kind, n, "envelope"), one.envelope

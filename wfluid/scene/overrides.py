@@ -10,14 +10,14 @@ from wfluid.scene.types import nearest
 
 
 def copied(tables: Any) -> Any:
-    """Nested tables and lists copied."""
+    """A deep copy of nested tables and lists."""
     if isinstance(tables, Mapping):
         return {key: copied(value) for key, value in tables.items()}
     return [copied(value) for value in tables] if isinstance(tables, list) else tables
 
 
 def parse_value(text: str) -> Any:
-    """A TOML value; what is none is a text."""
+    """The TOML value of a text; a text that is no TOML value is returned as it is."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
@@ -32,7 +32,7 @@ def set_value(tables: Any, path: list[str], value: Any, setting: str) -> None:
     """Set the value at a path of keys, names and numbers, in place.
 
     Raises:
-        SceneError: a table of a list that does not exist; begins with `setting`.
+        SceneError: an item of a list that does not exist; the message quotes `setting`.
     """
     at = tables
     step: str | int
@@ -44,7 +44,7 @@ def set_value(tables: Any, path: list[str], value: Any, setting: str) -> None:
             if not last and step not in at:
                 at[step] = {}
         else:
-            raise SceneError(f"--set {setting!r}: {'.'.join(path[:n])} is a value, not a table")
+            raise SceneError(f"--set {setting!r}: {'.'.join(path[:n])} is a value: expected a table")
         if last:
             at[step] = value
         else:
@@ -57,5 +57,5 @@ def _item(items: list, step: str, setting: str) -> int:
         return names.index(step)
     if step.isdecimal() and int(step) < len(items):
         return int(step)
-    there = [name for name in names if name]
-    raise SceneError(f"--set {setting!r}: no item {step!r} of {len(items)}{nearest(step, there)}")
+    known = [name for name in names if name]
+    raise SceneError(f"--set {setting!r}: no item {step!r} of {len(items)}{nearest(step, known)}")

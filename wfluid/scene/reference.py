@@ -9,7 +9,7 @@ from wfluid.scene.schema import ArrayOf, Key, MapOf, Part, Table, Union
 
 
 def tables(what: Part = SCENE, path: str = "") -> Iterator[tuple[str, str, Table]]:
-    """Every table with keys: its heading in TOML, what it is for, and itself."""
+    """Every table below `what`: its heading in TOML, its meaning, and the table."""
     if isinstance(what, ArrayOf | MapOf):
         yield from tables(what.each, f"[{path}]" if isinstance(what, ArrayOf) else f"{path}.NAME")
     elif isinstance(what, Union):
@@ -23,7 +23,7 @@ def tables(what: Part = SCENE, path: str = "") -> Iterator[tuple[str, str, Table
 
 
 def reference() -> str:
-    """The keys as Markdown: a section a table, a row a key."""
+    """All keys as Markdown: a section for each table, a row for each key."""
     lines = []
     for heading, meaning, table in tables():
         lines += ["", f"### `{heading}`", "", f"{meaning}.", ""]

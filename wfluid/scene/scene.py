@@ -1,6 +1,6 @@
-"""Scenes: one TOML file that says a whole shot.
+"""Scenes: one TOML file describes one shot.
 
-`format` has the tables, `staging` makes the animation. Files are named relative to the scene's folder.
+`format` defines the tables, `staging` makes the animation. File names are relative to the scene's folder.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from wfluid.scene.schema import Key, SceneError, SchemaError, blame, dotted
 
 
 class Scene(SceneTables):
-    """A shot: its tables as attributes, such as `scene.fluid.cells`, and where it comes from.
+    """A shot: its tables as attributes, such as `scene.fluid.cells`, and its origin.
 
     Raises:
-        SceneError: a key that is unknown, missing or has a wrong value; names that do not fit together.
+        SceneError: a key that is unknown, missing or has a wrong value; an unknown name.
     """
 
     tables: Mapping[str, Any]
-    """What was given: nested dictionaries and lists, as TOML has them."""
+    """The given keys as nested dictionaries and lists, as TOML has them."""
     folder: Path
-    """Where the names of files begin."""
+    """The folder that file names are relative to."""
     source: str
-    """What to call it in messages."""
+    """The name of the scene in messages."""
     lines: Mapping[tuple, int]
-    """Line of the file by a key's path, where known."""
+    """Line in the file, by the path of a key."""
     flags: Mapping[tuple, str]
-    """What of a command line a key's path comes from, where the scene is one."""
+    """Flag of the command line, by the path of a key."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Scene(SceneTables):
             raise self.error(error) from None
 
     def error(self, error: SchemaError) -> SceneError:
-        """What is wrong with a key, with the scene's name and line, or with the flag it comes from."""
+        """The error of a key with the name and line of the scene, or with the flag that set the key."""
         path = error.path
         for end in range(len(path), 0, -1):
             if path[:end] in self.flags:
@@ -71,7 +71,7 @@ class Scene(SceneTables):
         return SceneError(f"{self.source}: {error}")
 
     def with_tables(self, tables: Mapping[str, Any]) -> Scene:
-        """A scene of other tables, from the same place.
+        """A scene with other tables and the same origin.
 
         Raises:
             SceneError: as `Scene`.
@@ -79,12 +79,12 @@ class Scene(SceneTables):
         return Scene(tables, self.folder, self.source, self.lines, self.flags)
 
     def with_values(self, settings: Sequence[str]) -> Scene:
-        """The scene with some values set, each as "path=value"; the value is TOML, or else a text.
+        """The scene with some values changed, each by "path=value"; the value is TOML, or else a text.
 
-        An item of a list is named by its number from 0, or by its name.
+        An item of a list is given by its number, from 0, or by its name.
 
         Raises:
-            SceneError: a setting without "=", a path that leads nowhere, or a value that is wrong.
+            SceneError: a setting without "=", an unknown path, or a wrong value.
         """
         if not settings:
             return self
@@ -97,20 +97,23 @@ class Scene(SceneTables):
         return self.with_tables(tables)
 
     def writing(self, pictures: Sequence[str], report: str | None) -> Scene:
-        """The scene with these outputs in the current folder, not its own of the picture; and a report."""
+        """The scene with `pictures` in place of its outputs of the picture, and with a report.
+
+        The names are relative to the current folder.
+        """
         if not (pictures or report):
             return self
         tables = copied(self.tables)
         outputs = tables.setdefault("output", [])
-        here = [os.path.abspath(name) for name in pictures]
-        if here:
+        absolute = [os.path.abspath(name) for name in pictures]
+        if absolute:
             outputs[:] = [output for output in outputs if output.get("of", "picture") != "picture"]
-        outputs += [{"file": name} for name in here]
+        outputs += [{"file": name} for name in absolute]
         outputs += [{"file": os.path.abspath(report), "of": "report"}] if report else []
         return self.with_tables(tables)
 
     def tables_in(self, folder: Path) -> dict[str, Any]:
-        """The tables of the same scene in another folder, where its names of files begin."""
+        """The tables with file names relative to another folder."""
 
         def renamed(name: str) -> str:
             return name if os.path.isabs(name) else os.path.relpath(self.folder / name, folder)
@@ -126,7 +129,7 @@ class Scene(SceneTables):
 
     @property
     def frame_count(self) -> int:
-        """Frames that are written, at most.
+        """Largest number of frames written.
 
         Raises:
             SceneError: as `timeline`.
@@ -136,26 +139,26 @@ class Scene(SceneTables):
 
     @property
     def timeline(self) -> Timeline:
-        """When frames are shown.
+        """The timeline of the frames.
 
         Raises:
-            SceneError: a length or a rate that makes no sense.
+            SceneError: a duration or a frame rate outside its range.
         """
         time, keyframes = self.time, self.keyframes
         times = [keyframes.time, *(move.time for move in keyframes.moves)] if keyframes else []
-        named = [at for at in times if at is not None]
-        # no frame falls short of the last keyframe
-        until = math.ceil(max(named) * time.fps - 1e-6) / time.fps if named else DURATION
-        duration = until if time.duration is None else time.duration
+        given = [at for at in times if at is not None]
+        # the last frame is at the last keyframe, or after it
+        end = math.ceil(max(given) * time.fps - 1e-6) / time.fps if given else DURATION
+        duration = end if time.duration is None else time.duration
         with self.blame("time"):
             return Timeline(duration, time.fps, time.substeps)
 
     @contextmanager
     def blame(self, *path: str | int) -> Iterator[None]:
-        """Name the scene, its line and a key in what is refused within.
+        """Name the scene, its line and a key in the errors raised inside the block.
 
         Raises:
-            SceneError: instead of what is refused.
+            SceneError: the error with its place.
         """
         try:
             with blame(*path):

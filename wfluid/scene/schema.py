@@ -1,9 +1,9 @@
-"""Tables of a scene as classes, whose fields say all there is to say of a key.
+"""The tables of a scene as classes; a field defines everything about one key.
 
-A field made by `key` has type, range, unit, default and words for people; `table`, `array`, `mapping` and
-`optional` hold further tables. From the fields come the check of nested dictionaries as TOML gives them,
-the objects made from them, the reference and the flags of the command line. What is wrong is refused with
-the key's path, such as `force.2.radius`, and the nearest key or word there is.
+A field made by `key` has the type, range, unit, default and meaning of a value; fields made by `table`,
+`array`, `mapping` and `optional` hold further tables. The check of a TOML file, the objects made from it, the
+reference and the flags of the command line all follow from the fields. An error names the path of the key,
+such as `force.2.radius`, and the nearest known key or word.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from wfluid.system.errors import FileError
 
 
 class SchemaError(ValueError):
-    """A key that is unknown, missing, or has a wrong value, with which the reason then begins.
+    """A key that is unknown, missing, or has a wrong value.
 
-    `path` leads to it.
+    `path` leads to the key; `about_value` is true if `reason` begins with the wrong value.
     """
 
     def __init__(self, path: Sequence[str | int], reason: str, about_value: bool = False):
@@ -28,22 +28,23 @@ class SchemaError(ValueError):
 
 
 class SceneError(ValueError):
-    """A scene that cannot be read or makes no sense; the message names file, line where known, and key."""
+    """A scene that cannot be read or has an error; the message names file, line where known, and key."""
 
 
 def dotted(path: Sequence[str | int]) -> str:
-    """A path as a person writes it."""
+    """A path with dots, as in TOML."""
     return ".".join(map(str, path)) or "the file"
 
 
 @contextmanager
 def blame(*path: str | int, file: str = "") -> Iterator[None]:
-    """Name a key, or a file, in what is refused within.
+    """Name a key, or a file, in the errors raised inside the block.
 
-    A file that cannot be read has its name already; a key with a `file` has both.
+    The error of a file that cannot be read names the file already, and passes through.
 
     Raises:
-        SchemaError: instead of what is refused, where a path is given; else a ValueError with the file.
+        SchemaError: the error with the path of the key.
+        ValueError: the error with the name of the file, where no path is given.
     """
     try:
         yield
@@ -57,46 +58,46 @@ def blame(*path: str | int, file: str = "") -> Iterator[None]:
         raise (SchemaError(path, reason) if path else ValueError(reason)) from error
 
 
-# What a scene may say
+# Keys and tables
 
 
 class Key(NamedTuple):
-    """One value."""
+    """A key with a value."""
 
     meaning: str
-    """What it is for, in a few words."""
+    """Meaning, in a few words."""
     kind: Type
-    """What it may be."""
+    """Type and range of the value."""
     unit: str = ""
-    """Unit."""
+    """Unit of the value."""
     default: Any = None
-    """What it is when left out; None where that is no one value."""
+    """Default value; None if it depends on other values."""
     otherwise: str = ""
-    """What it is when left out, in words, where that is no one value."""
+    """Default in words, where it depends on other values."""
     required: bool = False
-    """Whether it must be there."""
+    """Whether the key must be given."""
     file: str = ""
-    """"file" where it names one, relative to the scene's folder; "painting" where `self` is none."""
+    """"file" for the name of a file, relative to the scene; "painting" where `self` is allowed too."""
     flag: str = ""
-    """The flag of the command line that sets it and nothing else."""
+    """Flag of the command line that sets only this key."""
     metavar: str | None = None
-    """What stands for the value in the flag's help."""
+    """Placeholder of the value in the help of the flag."""
     form: str = ""
-    """What of a command line says it, where that says more than this key."""
+    """Flag or argument that sets this key together with others."""
 
     @property
     def check(self):
-        """Gives the value as it is kept; raises ValueError with what was expected."""
+        """Returns the value in its stored form; raises ValueError with the expected type."""
         return self.kind.check
 
     @property
     def type(self) -> str:
-        """What is expected, for people."""
+        """The expected type, in words."""
         return self.kind.text
 
     @property
     def shown_default(self) -> str:
-        """What it is when left out, for people."""
+        """The default, in words."""
         if self.default in (None, ()):
             return self.otherwise
         if isinstance(self.default, bool):
@@ -105,95 +106,95 @@ class Key(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Keys and tables by name."""
+    """A table with known keys."""
 
     meaning: str
-    """What it is for."""
+    """Meaning, in a few words."""
     keys: Mapping[str, Key | Table | ArrayOf | MapOf | Union]
-    """What may be in it."""
+    """Its keys and inner tables."""
     make: type[SceneTable]
     """The class of its objects."""
     attributes: Mapping[str, str]
-    """The attribute of the object, by key."""
+    """Attribute of the object, by key."""
     not_in_morph: Mapping[str, str]
-    """Why a morph has no use for a key, by key."""
+    """Reason why a morph does not allow a key, by key."""
 
 
 class ArrayOf(NamedTuple):
     """An array of tables."""
 
     each: Table | Union
-    """What each is."""
+    """Type of its items."""
     unique: str | None = None
-    """A key whose values must differ."""
+    """Key whose values must differ."""
 
 
 class MapOf(NamedTuple):
-    """Tables under names of the user's choice."""
+    """A table of tables under names that the user chooses."""
 
     each: Table | Union
-    """What each is."""
+    """Type of its items."""
 
 
 class Union(NamedTuple):
-    """A table whose key `kind` says which."""
+    """One of several tables, chosen by the key `kind`."""
 
     meaning: str
-    """What it is for."""
+    """Meaning, in a few words."""
     tables: Mapping[str, Table]
-    """By kind."""
+    """The tables by kind."""
 
 
 Part = Key | Table | ArrayOf | MapOf | Union
 
 
-# Tables as classes
+# Classes of tables
 
 
 class Field(NamedTuple):
-    """What a class of tables says of one of its attributes."""
+    """The definition of one attribute of a class of tables."""
 
     what: Part
-    """What may be there."""
+    """Its key or table."""
     name: str = ""
-    """The key, where it is not called as the attribute."""
+    """Its key, if that differs from the attribute."""
     default: Callable[[], Any] = lambda: None
-    """Makes what it is when left out."""
+    """Makes the default value."""
     not_in_morph: str = ""
-    """Why a morph has no use for it, if it has none."""
+    """Reason why a morph does not allow it; empty if it does."""
 
 
 def key(meaning: str, kind: Type, *, name: str = "", not_in_morph: str = "", **more: Any) -> Any:
-    """An attribute with a value; `more` is of `Key`."""
+    """Define an attribute with a value; `more` are further fields of `Key`."""
     what = Key(meaning, kind, **more)
     return Field(what, name, lambda: what.default, not_in_morph)
 
 
 def file_key(meaning: str, *, painting: bool = True, **more: Any) -> Any:
-    """An attribute with the name of a file; of a painting, `self` is the picture that is animated."""
+    """Define an attribute with the name of a file; a painting may be `self`, the animated picture."""
     return key(meaning, text(), file="painting" if painting else "file", **more)
 
 
 def table(of: type[SceneTable], not_in_morph: str = "") -> Any:
-    """An attribute with a table, which has its defaults where it is left out."""
+    """Define an attribute with a table; without it in a scene, all its keys have their defaults."""
     return Field(table_of(of), "", of, not_in_morph)
 
 
 def optional(of: type[SceneTable], not_in_morph: str = "") -> Any:
-    """An attribute with a table, None where it is left out."""
+    """Define an attribute with a table; None without it in a scene."""
     return Field(table_of(of), not_in_morph=not_in_morph)
 
 
 def array(
     of: type[SceneTable] | Union, *, name: str, unique: str | None = None, not_in_morph: str = ""
 ) -> Any:
-    """An attribute with an array of tables, a tuple."""
+    """Define an attribute with an array of tables, a tuple."""
     each = of if isinstance(of, Union) else table_of(of)
     return Field(ArrayOf(each, unique), name, tuple, not_in_morph)
 
 
 def mapping(of: Union) -> Any:
-    """An attribute with tables by names of the user's choice."""
+    """Define an attribute with named tables, a dictionary."""
     return Field(MapOf(of), default=dict)
 
 
@@ -203,19 +204,20 @@ def mapping(of: Union) -> Any:
     field_specifiers=(key, file_key, table, optional, array, mapping),
 )
 class SceneTable:
-    """Base of a scene's tables: what `key` and the like say of a class is an attribute of its objects.
+    """Base class of a scene's tables; its fields are defined by `key`, `table` and the like.
 
-    Attributes are keywords; what is left out has its default. The docstring is what the table is for.
+    Attributes are given as keywords; others have their defaults. The first line of the docstring is the
+    meaning of the table.
     """
 
     fields: ClassVar[Mapping[str, Field]] = {}
-    """By attribute, those of bases first."""
+    """Fields by attribute, those of base classes first."""
     kind: ClassVar[str] = ""
-    """What its key `kind` says, of one of some kinds."""
+    """Value of the key `kind`, for the tables of a `Union`."""
     trailing: ClassVar[bool] = False
-    """Whether the keys of a base are listed after those of the tables made from it."""
+    """Whether the keys of this base class are listed after those of derived classes."""
     given: frozenset[str]
-    """Attributes that were given."""
+    """Attributes that were given, not left at their defaults."""
 
     def __init_subclass__(cls) -> None:
         """Collect the fields."""
@@ -227,10 +229,10 @@ class SceneTable:
         }
 
     def __init__(self, **given: Any):
-        """Take what is given.
+        """Set the given attributes, and the others to their defaults.
 
         Raises:
-            TypeError: an attribute that there is not, or a required one that is missing.
+            TypeError: an unknown attribute, or a required one that is missing.
         """
         required = {
             name for name, one in self.fields.items() if isinstance(one.what, Key) and one.what.required
@@ -249,17 +251,17 @@ class SceneTable:
         return f"{type(self).__name__}({', '.join(shown)})"
 
     def gives(self, *attributes: str) -> bool:
-        """Whether one of these was given."""
+        """Whether at least one of these attributes was given."""
         return not self.given.isdisjoint(attributes)
 
 
 def union(meaning: str, *classes: type[SceneTable]) -> Union:
-    """A table of one of some kinds, each called as its class says."""
+    """One of several tables; a class has its kind in `kind`."""
     return Union(meaning, {one.kind: table_of(one) for one in classes})
 
 
 def table_of(of: type[SceneTable]) -> Table:
-    """What the fields of a class say."""
+    """The table that a class defines."""
     bases = [base for base in of.__mro__[1:] if issubclass(base, SceneTable)]
     late = {attribute for base in bases if vars(base).get("trailing") for attribute in base.fields}
     fields = dict(sorted(of.fields.items(), key=lambda item: item[0] in late))

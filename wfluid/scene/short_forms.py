@@ -20,20 +20,20 @@ FORMS = {
     "ink": ("X,Y:#RRGGBB", "center", "color"),
     "smoke": ("X,Y:#RRGGBB", "center", "color"),
 }
-"""By kind: how it is written, and the keys of what comes before the options."""
+"""By kind: the form, and the keys of the parts before the options."""
 
 DENSITY_OPTIONS = ("radius", "amount", "start", "end", "at", "rise", "fall", "strength", "diffusion", "lift")
-"""Keys that may follow a short form of a poured density: its source's, its own, and `lift`."""
+"""Options of the short form of a density: keys of its source and of itself, and `lift`."""
 
-_UNWRITTEN = ("path", "envelope", "points", "name", "group")
-"""Keys that have no short form."""
+_FILE_ONLY = ("path", "envelope", "points", "name", "group")
+"""Keys that only a scene file can have."""
 
 
 def parse_force(kind: str, text: str) -> dict[str, Any]:
     """The table of a force from its short form, such as push "X,Y:DX,DY:key=value,…".
 
     Raises:
-        ValueError: naming the part that is wrong.
+        ValueError: a wrong part; the message names it.
     """
     try:
         return checked(FORCES, read_force(kind, text))
@@ -42,27 +42,27 @@ def parse_force(kind: str, text: str) -> dict[str, Any]:
 
 
 def read_force(kind: str, text: str) -> dict[str, Any]:
-    """The table of a force from its short form, whose values a scene has yet to check.
+    """The table of a force from its short form; the ranges of its values are not checked yet.
 
     Raises:
-        ValueError: naming the part that is no short form.
+        ValueError: a part that cannot be read; the message names it.
     """
     return {"kind": kind, **_parsed(kind, text, force_options(kind))}
 
 
 def force_options(kind: str) -> list[str]:
-    """Keys that may follow a short form of a kind of force, as key=value,…"""
+    """Options of the short form of a force, each written key=value."""
     _, *positional = FORMS[kind]
-    return [key for key in FORCES.tables[kind].keys if key not in (*positional, *_UNWRITTEN)]
+    return [key for key in FORCES.tables[kind].keys if key not in (*positional, *_FILE_ONLY)]
 
 
 def parse_density(look: str, text: str, name: str) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """The table of a density poured at a point, and that of its buoyancy, from "X,Y:#RRGGBB:key=value,…".
+    """The tables of a density with a source, and of its buoyancy, from "X,Y:#RRGGBB:key=value,…".
 
-    `lift` is how far its own buoyancy carries it upwards where it is 1 [px].
+    `lift` is the displacement upwards by its buoyancy where it is 1 [px].
 
     Raises:
-        ValueError: naming the part that is wrong.
+        ValueError: a part that cannot be read; the message names it.
     """
     source = _parsed(look, text, list(DENSITY_OPTIONS))
     density = {"name": name, "color": source.pop("color"), "look": look}
@@ -76,7 +76,7 @@ def parse_density(look: str, text: str, name: str) -> tuple[dict[str, Any], dict
 
 
 def _parsed(kind: str, text: str, keys: list[str]) -> dict[str, Any]:
-    """The parts of a short form, by key."""
+    """The values of a short form, by key."""
     what, (form, *positional) = f"{kind} {text!r}", FORMS[kind]
     if kind == "image":
         name, colon, options = text.rpartition(":")
@@ -120,14 +120,14 @@ def _option(what: str, key: str, value: str) -> Any:
 
 
 def as_pair(what: str, name: str, part: str) -> list[float]:
-    """Two numbers, "X,Y".
+    """Two numbers from "X,Y".
 
     Raises:
-        ValueError: not two, or no numbers; begins with `what`.
+        ValueError: not two numbers; the message begins with `what`.
     """
     numbers = part.split(",")
     if len(numbers) != 2:
-        raise ValueError(f"{what}: {name} needs two numbers, got {part!r}")
+        raise ValueError(f"{what}: {name} is {part!r}: expected two numbers")
     return [as_number(f"{what}: {name}", number) for number in numbers]
 
 
@@ -135,7 +135,7 @@ def parse_move(text: str) -> dict[str, Any]:
     """The table of a move from its short form, "X0,Y0:X1,Y1" or "X0,Y0:X1,Y1@SECONDS".
 
     Raises:
-        ValueError: naming the part that is wrong.
+        ValueError: a part that cannot be read; the message names it.
     """
     what = f"move {text!r}"
     places, at, time = text.partition("@")

@@ -1,4 +1,4 @@
-"""Scenes as TOML files, with the line of what is wrong."""
+"""Scenes read from TOML files and written to them; errors name the line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
     """The scene in a TOML file.
 
     Raises:
-        SceneError: no such file, no TOML (with line and column), or keys that are wrong.
+        SceneError: a missing file, wrong TOML (with line and column), or a wrong key (with line).
     """
     path = Path(path)
     try:
@@ -41,7 +41,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
 
 
 def write_scene(path: str | os.PathLike, scene: Scene) -> None:
-    """Write a scene as TOML, whole or not at all, its names of files relative to it.
+    """Write a scene as TOML, with file names relative to it; on an error no file is left behind.
 
     Raises:
         FileError: the file cannot be written.
@@ -54,7 +54,7 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
 
 
 def _line_and_column(text: str) -> str:
-    """Where a well-formed text is wrong, such as a key given twice, of which tomlkit says no place."""
+    """Line and column of an error that tomlkit reports without a place, such as a key given twice."""
     try:
         tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -68,7 +68,7 @@ _SETTING = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
 
 
 def _lines_of(text: str) -> dict[tuple, int]:
-    """Line by path, of headings and of keys at the beginning of a line."""
+    """The lines of headings, and of keys at the start of a line, by path."""
     found: dict[tuple, int] = {}
     counts: dict[tuple, int] = {}
     table: tuple = ()

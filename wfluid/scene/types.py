@@ -1,4 +1,4 @@
-"""What values of a scene may be: numbers with ranges, words, texts, lists; each with its words for people."""
+"""Types of a scene's values: numbers with ranges, words, texts, lists."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ LARGEST = sys.float_info.max
 
 
 class Type(NamedTuple):
-    """What a value may be."""
+    """The type of a value."""
 
     check: Callable[[Any], Any]
-    """Gives the value as it is kept; raises ValueError with what was expected."""
+    """Returns the value in its stored form; raises ValueError with the expected type."""
     text: str
-    """What is expected, for people."""
+    """The expected type, in words."""
     read: Callable[[str], Any] = str
-    """The value from a word of a command line."""
+    """Reads the value from an argument of the command line."""
     words: tuple[str, ...] = ()
-    """The words that it may be, if there are only some."""
+    """The allowed words, if the type is a choice."""
 
 
 def number(least: float = -math.inf, most: float = math.inf, above: float | None = None) -> Type:
@@ -86,7 +86,7 @@ def word(*words: str) -> Type:
 
 
 def numbers(count: int, what: str) -> Type:
-    """So many finite numbers."""
+    """A list of `count` finite numbers; `what` describes it in messages."""
     one = number().check
 
     def check(value: Any) -> list[float]:
@@ -101,7 +101,7 @@ def numbers(count: int, what: str) -> Type:
 
 
 def rows(count: int, least: int, what: str) -> Type:
-    """A list of `least` or more rows of `count` numbers each; of one each, plain numbers."""
+    """A list of at least `least` rows of `count` numbers each; with a count of 1, a list of numbers."""
     row = number().check if count == 1 else numbers(count, what).check
 
     def check(value: Any) -> list:
@@ -116,7 +116,7 @@ def rows(count: int, least: int, what: str) -> Type:
 
 
 def names() -> Type:
-    """One name, or a list of names; kept as a list."""
+    """One name, or a list of names; stored as a list."""
 
     def check(value: Any) -> list[str]:
         found = value if isinstance(value, list) else [value]
@@ -128,7 +128,7 @@ def names() -> Type:
 
 
 def color() -> Type:
-    """A colour of six hexadecimal digits; kept in small letters."""
+    """A colour of six hexadecimal digits; stored in lower case."""
 
     def check(value: Any) -> str:
         if not isinstance(value, str) or not re.fullmatch(r"#[0-9a-fA-F]{6}", value):
@@ -139,7 +139,7 @@ def color() -> Type:
 
 
 def curve(words: Sequence[str]) -> Type:
-    """A curve by its name, or with keys; on a command line "SECONDS:PART,…"."""
+    """A curve, by its name or by keys; on the command line "SECONDS:PART,…"."""
     by_name = word(*words).check
     by_keys = rows(2, 1, f"{', '.join(words)}, or a list of keys, [[seconds, value], …]").check
 
@@ -149,7 +149,7 @@ def curve(words: Sequence[str]) -> Type:
     def key(part: str) -> list[float]:
         numbers = part.split(":")
         if len(numbers) != 2:
-            raise ValueError(f"{part!r} is not SECONDS:PART")
+            raise ValueError(f"{part!r}: expected SECONDS:PART")
         return [as_number("a key", number) for number in numbers]
 
     def read(text: str) -> str | list[list[float]]:
@@ -159,11 +159,11 @@ def curve(words: Sequence[str]) -> Type:
 
 
 def version(newest: int) -> Type:
-    """The version of a format, up to the newest that this program reads."""
+    """A version of the format, at most the `newest` that this program reads."""
 
     def check(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            raise ValueError("expected a whole number from 1 on")
+            raise ValueError("expected a whole number from 1")
         if value > newest:
             raise ValueError(f"a scene of a newer version; this wfluid reads up to {newest}: update wfluid")
         return value
@@ -175,7 +175,7 @@ def as_number(name: str, part: str) -> float:
     """A finite number in a text.
 
     Raises:
-        ValueError: no number; begins with `name`.
+        ValueError: not a finite number; the message begins with `name`.
     """
     try:
         value = float(part)
@@ -187,7 +187,7 @@ def as_number(name: str, part: str) -> float:
 
 
 def nearest(value: Any, known: Sequence[str]) -> str:
-    """Ask for the most similar of what is known, if there is one."""
+    """A question that proposes the most similar known word; empty if none is similar."""
     import difflib  # only for messages: every start of the command line loads this file
 
     near = difflib.get_close_matches(str(value), list(known), n=1, cutoff=0.5)

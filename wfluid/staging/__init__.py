@@ -1,1 +1,1 @@
-"""A scene made into objects."""
+"""Scenes made into animations: files read, pixels turned into domain units."""

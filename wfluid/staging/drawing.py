@@ -1,9 +1,9 @@
-"""Forces as a person draws them on the picture, in pixels and seconds: tables of `scene.forces`.
+"""Forces drawn on the picture, in pixels and seconds: tables of `scene.forces`.
 
-What is drawn is how far something would be carried by that force alone: the centre by the arrow of a
-push, a turn of a vortex's centre, the typical way of noise. Pressure takes half of a Gaussian push (in
-two dimensions the divergence-free part of exp(-r^2/2s^2) e has at r = 0 half its strength, whatever s),
-so it is twice what a free particle would need; viscosity and walls then shorten the way.
+A drawn length is the displacement that the force alone causes: of the centre by a push, of the centre's
+angle by a vortex, root mean square by noise. The pressure cancels half of a Gaussian push: in two dimensions
+the divergence-free part of exp(-r^2 / 2 s^2) e has half its strength at r = 0, whatever s. A push is
+therefore twice as strong as a free particle needs. Viscosity and walls shorten the displacement.
 """
 
 from __future__ import annotations
@@ -55,76 +55,89 @@ from wfluid.staging.images import SceneImages
 from wfluid.staging.timing import envelope_and_scale, phase_of, time_window
 
 _PRESSURE = 2.0
+"""Factor on a Gaussian push, of which the pressure cancels half."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """What the numbers of drawn forces refer to.
+    """The frame and the times that drawn forces refer to.
 
     Drawing(1024, 768, duration=2.0).force({"kind": "push", "center": [621, 451], "by": [22, 15]})
     """
 
-    width: int
-    """Of the frame that pixels refer to."""
-    height: int
-    """Of the frame that pixels refer to."""
+    width: float
+    """Width of the frame [px]."""
+    height: float
+    """Height of the frame [px]."""
     duration: float
-    """Of the animation [s]."""
+    """Length of the animation [s]."""
     scheme: str = "standard"
-    """The fluid's; the paper's oscillators begin as a sine."""
+    """Numerical scheme of the fluid; in "paper" oscillators start as a sine."""
     loop: str | None = None
-    """The animation's; in an oscillating loop forces go on through its end."""
+    """Loop of the animation; in "oscillate" forces continue across its end."""
     envelopes: Mapping[str, Envelope] = field(default_factory=dict)
-    """Envelopes that forces speak of, by name."""
+    """Named envelopes of the scene."""
     weight: Painted | None = None
-    """Where forces act that name no mask."""
+    """Mask of forces without their own."""
     frozen: Freeze | None = None
-    """What stays where it is: no growth acts there."""
+    """Frozen parts of the picture, where no growth acts."""
     images: SceneImages | None = None
-    """Reads the pictures that forces name."""
+    """Reads the pictures of forces and masks."""
 
     @property
     def side(self) -> float:
         """The frame's longer side [px]."""
         return max(self.width, self.height)
 
-    def force(self, force: ForceTable | Mapping[str, Any], seed: int = 0) -> Force:
-        """The force that a table draws: a scene's, or a dictionary such as `parse_force` gives.
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width and height of the frame [longer side]."""
+        return self.width / self.side, self.height / self.side
 
-        `seed` is that of noise which names none.
+    def force(self, force: ForceTable | Mapping[str, Any], seed: int = 0) -> Force:
+        """The force of a scene's table, or of a dictionary as `parse_force` returns.
+
+        `seed` is for noise without its own.
 
         Raises:
-            ValueError: a key that is wrong, a place outside the picture, a window outside the animation,
-                keys that contradict.
+            ValueError: a wrong key, a place outside the picture, a window outside the animation, keys that
+                exclude each other, a picture without `images`.
         """
         if isinstance(force, Mapping):
             force = made(FORCES, checked(FORCES, force))
-        make = {
-            PushTable: self._push,
-            VortexTable: self._vortex,
-            GrowTable: self._grow,
-            StrokeTable: self._stroke,
-            WindTable: self._wind,
-            NoiseTable: lambda noise: self._noise(noise, seed),
-            ImageTable: self._image,
-            BuoyancyTable: self._buoyancy,
-        }[type(force)]
-        return make(force)
+        match force:
+            case PushTable():
+                return self._push(force)
+            case VortexTable():
+                return self._vortex(force)
+            case GrowTable():
+                return self._grow(force)
+            case StrokeTable():
+                return self._stroke(force)
+            case WindTable():
+                return self._wind(force)
+            case NoiseTable():
+                return self._noise(force, seed)
+            case ImageTable():
+                return self._image(force)
+            case BuoyancyTable():
+                return self._buoyancy(force)
+        raise TypeError(f"{force!r}: expected a table of {', '.join(FORCES.tables)}")
 
     def center(self, what: str, spot: Spot) -> Center:
-        """Where a spot is [longer side].
+        """The centre of a spot, or its path [longer side].
 
         Raises:
-            ValueError: neither a center nor a path, both, or a place outside the picture.
+            ValueError: both center and path, or neither; a place outside the picture.
         """
-        if (spot.center is None) == (spot.path is None):
-            raise ValueError(f"{what}: expected either center or path")
-        if spot.path is None:
+        if spot.center is not None and spot.path is None:
             return self.place(what, spot.center)
-        return self._path(what, spot.path)
+        if spot.path is not None and spot.center is None:
+            return self._path(what, spot.path)
+        raise ValueError(f"{what}: expected either center or path")
 
     def place(self, what: str, at: Sequence[float]) -> tuple[float, float]:
-        """A place [longer side] from pixels.
+        """A place in domain units [longer side] from pixels.
 
         Raises:
             ValueError: outside the picture.
@@ -140,15 +153,18 @@ class Drawing:
         return self._length(spot.radius, RADIUS)
 
     def envelope_and_scale(self, what: str, timing: Timing) -> tuple[Envelope, float]:
-        """The envelope, with those it names and its strength, and what carries a free particle by one."""
+        """The envelope of a force, and the acceleration that displaces a free particle by 1.
+
+        As `timing.envelope_and_scale`; the envelope includes the named envelopes and the strength.
+        """
         envelope, per_length = envelope_and_scale(what, timing, self.duration, self.scheme, self.loop)
         return self.modulated(what, envelope, timing), per_length
 
     def modulated(self, what: str, envelope: Envelope, factor: Factor) -> Envelope:
-        """The envelope times those that a table names, and its strength.
+        """The envelope times the named envelopes and the strength of a table.
 
         Raises:
-            ValueError: an envelope that does not exist.
+            ValueError: an unknown envelope.
         """
         return product(factor.strength, envelope, *self.named(what, factor.envelope))
 
@@ -156,7 +172,7 @@ class Drawing:
         """The envelopes of these names.
 
         Raises:
-            ValueError: one that does not exist, with those that do.
+            ValueError: an unknown name; the message lists the known ones.
         """
         for name in names:
             if name not in self.envelopes:
@@ -164,15 +180,21 @@ class Drawing:
                 raise ValueError(f"{what}: there is no envelope {name!r}; there is {there}")
         return [self.envelopes[name] for name in names]
 
-    def _length(self, pixels: float | None, otherwise: float) -> float:
-        """A length [longer side] from pixels, or else one that is given so."""
-        return otherwise if pixels is None else pixels / self.side
+    def _length(self, pixels: float | None, default: float) -> float:
+        """A length [longer side] from pixels; `default` where it is None."""
+        return default if pixels is None else pixels / self.side
 
     def _vector(self, by: Sequence[float], factor: float) -> tuple[float, float]:
         return by[0] * factor / self.side, by[1] * factor / self.side
 
     def _mask(self, force: Masked) -> Painted | None:
-        return self.weight if force.mask is None else self.images.mask(force.mask)
+        return self.weight if force.mask is None else self._images.mask(force.mask)
+
+    @property
+    def _images(self) -> SceneImages:
+        if self.images is None:
+            raise ValueError("a force with a picture or a mask needs Drawing(…, images=SceneImages(…))")
+        return self.images
 
     def _path(self, what: str, rows: Sequence[Row]) -> Path:
         return Path([row[0] for row in rows], [self.place(what, row[1:]) for row in rows])
@@ -190,12 +212,12 @@ class Drawing:
         )
 
     def _grow(self, grow: GrowTable) -> Growth:
-        """Twice the logarithm of the factor is the area's; a rate, not an acceleration, takes it there."""
+        """A rate of divergence, not an acceleration; the area grows by the square of the factor."""
         area, center = 2 * math.log(grow.factor), self.center("grow", grow)
         envelope, _ = envelope_and_scale("grow", grow, self.duration, self.scheme, self.loop)
         if grow.period is None:
             rate = area / envelope.integral(0.0, self.duration)
-        else:  # the cosine of the rate is the sine of the growth
+        else:  # a cosine as the rate makes a sine of the growth
             start, end = time_window("grow", grow, self.duration)
             wave = Oscillator(period=grow.period, phase=grow.phase, start=start, end=end, centred=False)
             rate, envelope = area * 2 * math.pi / grow.period, wave * _fade(grow, start, end)
@@ -203,7 +225,7 @@ class Drawing:
         return Growth(center, rate, self.radius(grow), envelope, self._unfrozen(self._mask(grow)))
 
     def _unfrozen(self, weight: Painted | None) -> Painted | None:
-        """A weight without what is frozen."""
+        """A weight that is 0 where the picture is frozen."""
         if self.frozen is None:
             return weight
         free = 1.0 - self.frozen.paint.values
@@ -213,17 +235,17 @@ class Drawing:
         return Painted(weight.values * resample(free.astype(np.float32), width, height).clip(0, 1))
 
     def _stroke(self, stroke: StrokeTable) -> Stroke:
-        if (stroke.points is None) == (stroke.path is None):
-            raise ValueError("stroke: expected either points or path")
-        if stroke.points is None:
+        if stroke.path is not None and stroke.points is None:
             if stroke.gives("start", "end"):
-                raise ValueError("stroke: a path has its own times; it goes without start and end")
+                raise ValueError("stroke: a path has its own times; leave out start and end")
             path = self._path("stroke", stroke.path)
             if path.times[0] >= self.duration:
                 raise ValueError(f"stroke: its path begins at {path.times[0]:g} s, after the animation")
-        else:
+        elif stroke.points is not None and stroke.path is None:
             points = [self.place("stroke", at) for at in stroke.points]
             path = Path.along(points, *time_window("stroke", stroke, self.duration))
+        else:
+            raise ValueError("stroke: expected either points or path")
         envelope = product(1.0, Constant(), *self.named("stroke", stroke.envelope))
         return Stroke(path, self.radius(stroke), stroke.strength, envelope, self._mask(stroke))
 
@@ -247,12 +269,13 @@ class Drawing:
         envelope, per_length = self.envelope_and_scale(f"force image {image.file}", image)
         strength = self._length(image.amount, IMAGE_LENGTH) * per_length
         radius = self._length(image.radius, IMAGE_BLUR)
-        read = self.images.read if image.along == "vectors" else self.images.paint
+        images = self._images
+        read = images.read if image.along == "vectors" else images.paint
         with blame(file=image.file):
             force = ImageForce(read(image.file), image.along, strength, envelope, weight, radius)
         if image.along == "gradient" and weight is None:
-            self.images.note(
-                f"{image.file}: the pressure balances a gradient wholly, so alone it moves nothing; "
+            images.note(
+                f"{image.file}: the pressure cancels the force of a gradient, so nothing moves; "
                 "use along=contour, or give it a mask"
             )
         return force
@@ -262,10 +285,10 @@ class Drawing:
         return Buoyancy(buoyancy.density, self._vector(buoyancy.by, per_length), envelope)
 
     def envelope(self, table: EnvelopeTable) -> Envelope:
-        """The envelope that a scene's table says.
+        """The envelope of a scene's table.
 
         Raises:
-            ValueError: values that contradict.
+            ValueError: values that contradict each other.
         """
         if isinstance(table, SamplesTable):
             return Arbitrary(times=table.times, values=table.values)

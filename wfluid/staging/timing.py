@@ -1,4 +1,4 @@
-"""When a drawn force acts, and how strong it must be to carry as far as it is drawn."""
+"""Envelopes of drawn forces, and the strength that causes the drawn displacement."""
 
 from __future__ import annotations
 
@@ -7,24 +7,25 @@ import math
 from wfluid.domain.envelopes import Constant, Envelope, Fade, Instantaneous
 from wfluid.domain.limits import LEAST_TIME
 from wfluid.domain.oscillator import Oscillator
-from wfluid.scene.forces import LOOP_PHASE, PHASE, Blow, Ramps, Wave, Window
+from wfluid.scene.forces import LOOP_PHASE, PHASE, Impulse, Ramps, Wave, Window
 
 PAPER_PHASE = 0.0
-"""Part of a period that the paper's oscillators are ahead where nothing says it: they are a sine."""
+"""Default phase in the scheme "paper", a part of a period: a sine."""
 
 
 def envelope_and_scale(
     what: str, timing: Window, duration: float, scheme: str = "standard", loop: str | None = None
 ) -> tuple[Envelope, float]:
-    """The envelope that a table says, and the acceleration (or velocity) that carries a free particle by one.
+    """The envelope of a force, and the acceleration (or velocity) that displaces a free particle by 1.
 
-    By the end of its window; a blow (`at`) by the end of the animation, an oscillator to either side.
+    The displacement is that at the end of the window; of an impulse (`at`) at the end of the animation; of an
+    oscillator its amplitude. `what` begins the messages.
 
     Raises:
-        ValueError: keys that contradict, or a window outside the animation.
+        ValueError: keys that exclude each other, or a window outside the animation.
     """
     _check(what, timing)
-    if isinstance(timing, Blow) and timing.at is not None:
+    if isinstance(timing, Impulse) and timing.at is not None:
         if timing.at >= duration:
             raise ValueError(f"{what} at={timing.at:g}: the animation lasts {duration:g} s")
         return Instantaneous(timing.at), 1.0 / (duration - timing.at)
@@ -39,10 +40,10 @@ def envelope_and_scale(
 
 
 def time_window(what: str, window: Window, duration: float) -> tuple[float, float]:
-    """When a force begins and ends [s].
+    """Start and end of a force [s].
 
     Raises:
-        ValueError: outside the animation, or too short.
+        ValueError: a window outside the animation, or too short.
     """
     start, end = window.start, duration if window.end is None else window.end
     if start >= duration:
@@ -51,18 +52,18 @@ def time_window(what: str, window: Window, duration: float) -> tuple[float, floa
         raise ValueError(f"{what}: end {end:g} is not after start {start:g}")
     if end - start < LEAST_TIME:
         raise ValueError(
-            f"{what} from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; at= is a blow"
+            f"{what} from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; for an impulse give at="
         )
     return start, end
 
 
 def phase_of(wave: Wave, loop: str | None) -> float:
-    """Part of a period that an oscillation is ahead.
+    """Phase of an oscillation, a part of a period.
 
-    In an oscillating loop the flow has swung before: -sin is the force of a swing along the arrow first.
+    An oscillating loop starts in the middle of its motion: the force -sin displaces along the arrow first.
     """
-    usual = LOOP_PHASE if loop == "oscillate" else PHASE
-    return usual if wave.phase is None else wave.phase
+    default = LOOP_PHASE if loop == "oscillate" else PHASE
+    return default if wave.phase is None else wave.phase
 
 
 def _steady(
@@ -79,7 +80,7 @@ def _steady(
 
 def _check(what: str, timing: Window) -> None:
     window = ("period", "phase", "start", "end", "rise", "fall")
-    if isinstance(timing, Blow) and timing.at is not None and timing.gives(*window):
-        raise ValueError(f"{what}: at= is one blow; it goes without period, phase, start, end, rise and fall")
+    if isinstance(timing, Impulse) and timing.at is not None and timing.gives(*window):
+        raise ValueError(f"{what}: at= is an impulse: leave out period, phase, start, end, rise and fall")
     if isinstance(timing, Wave) and timing.gives("phase") and timing.period is None:
         raise ValueError(f"{what}: phase= needs period=")

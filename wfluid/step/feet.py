@@ -1,7 +1,9 @@
-"""What follows the velocity that a step begins with: the feet of all centres, and points; with transposes.
+"""Traces along the velocity at the beginning of a step: the feet of all centres, and points; with transposes.
 
-foot = x - dt v(x - dt v(x) / 2)        the paper's scheme: x - dt v(x)
+foot = x - dt v(x - dt v(x) / 2)        with scheme "paper": x - dt v(x)
 point = p + dt v(p + dt v(p) / 2)
+
+The foot (departure point) of a cell is the place from which the flow brings what arrives at its centre.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from functools import partial
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Vector, vector, where, zeros
+from wfluid.fields.arrays import Vector, lookup_args, vector, zeros
 from wfluid.fields.ghosts import Ghosts
 from wfluid.kernels.adjoint import advection as advection_adjoint
 from wfluid.kernels.adjoint import scatter
@@ -26,12 +28,14 @@ from wfluid.step.tape import attach_gradients, bars, record
 
 
 def new_places(layout: Layout, device: wp.Device) -> list[wp.array]:
-    """Where each cell reads a field: the index of the point before, and the fractions of a cell past it."""
+    """Arrays for the place at which each cell reads a field: the index of the point before it, and the
+    fractions of a cell from there, along x and y.
+    """
     return [zeros(layout.size, device, wp.int32), *vector(layout, device, 2)]
 
 
 class Feet:
-    """Traces where what arrives at the centres comes from, and where points go."""
+    """Traces the feet of all centres, and moves points."""
 
     def __init__(
         self,
@@ -43,22 +47,22 @@ class Feet:
     ):
         self.device, self.layout = device, Layout(grid.nx, grid.ny)
         self._velocity_ghosts, self._moved_ghosts = velocity_ghosts, moved_ghosts
-        self._where = where(grid, fluid.walls, self.layout)
+        self._lookup_args = lookup_args(grid, fluid.boundary, self.layout)
         self._paper = fluid.scheme == "paper"
         self.foot = vector(self.layout, device, 2)
 
     foot: Vector
-    """Where the last trace ended, as seen from each centre [cells], with ghosts."""
+    """The feet of the last trace, relative to the centres [cells], with ghosts."""
 
     def allow_gradients(self) -> None:
-        """Allocate what the transposes need."""
-        attach_gradients(self.foot, self.layout)
+        """Allocate the arrays of the transposes."""
+        attach_gradients(self.foot, self.layout, self.device)
         self._centre_bar, self._middle_bar = (vector(self.layout, self.device, 2) for _ in range(2))
         self._places = [new_places(self.layout, self.device) for _ in range(2)]
 
     def _numbers(self, forcing: Forcing) -> list:
-        """The step in cells a unit of velocity, and where the walls are."""
-        return [forcing.dt_hx, forcing.dt_hy, *self._where]
+        """The scalar arguments of the kernels: dt / h along both axes, and those of look-ups."""
+        return [forcing.dt_hx, forcing.dt_hy, *self._lookup_args]
 
     def trace(self, velocity: Vector, forcing: Forcing) -> Vector:
         """The feet of all centres, with ghosts."""
@@ -71,34 +75,34 @@ class Feet:
         return self.foot
 
     def _trace_back(self, velocity: Vector, forcing: Forcing) -> None:
-        """Add to the velocity's gradient: what was read at the middle of the step, and at the centre."""
+        """Add to the velocity's gradient: for its values at the middle of each trace, and at the centre."""
         layout, device, numbers = self.layout, self.device, self._numbers(forcing)
         velocity_bar, foot_bar, centre_bar = bars(velocity), bars(self.foot), self._centre_bar
         if self._paper:
             inputs = [*velocity, *foot_bar, *numbers]
             advection_adjoint.trace_euler_adjoint.launch(layout, device, inputs, centre_bar)
         else:
-            middle_bar, read = self._middle_bar, [array for place in self._places for array in place]
-            advection_adjoint.place_middles.launch(layout, device, [*velocity, *numbers], read)
-            inputs, outputs = [*velocity, *foot_bar, *read, *numbers], [*middle_bar, *centre_bar]
+            middle_bar, places = self._middle_bar, [array for place in self._places for array in place]
+            advection_adjoint.place_middles.launch(layout, device, [*velocity, *numbers], places)
+            inputs, outputs = [*velocity, *foot_bar, *places, *numbers], [*middle_bar, *centre_bar]
             advection_adjoint.trace_midpoint_adjoint.launch(layout, device, inputs, outputs)
             with together():
-                for turn, (place, f, out) in enumerate(
+                for axis, (place, f, out) in enumerate(
                     zip(self._places, middle_bar, velocity_bar, strict=True)
                 ):
                     inputs = [*place, f, layout.nx, layout.pitch]
-                    scatter.scatter_bilinear.launch(layout, device, inputs, [out], turn=turn)
+                    scatter.scatter_bilinear.launch(layout, device, inputs, [out], turn=axis)
         with together():
             for f, ghosts in zip(centre_bar, self._moved_ghosts, strict=True):
                 ghosts.fill(f)
         with together():
-            for f, before, out in zip(centre_bar, (1, layout.pitch), velocity_bar, strict=True):
-                inputs = [f, before, layout.nx]
+            for f, stride, out in zip(centre_bar, (1, layout.pitch), velocity_bar, strict=True):
+                inputs = [f, stride, layout.nx]
                 advection_adjoint.add_face_means.launch(layout, device, inputs, [out])
         self._fold(velocity_bar)
 
     def carry_points(self, points: Vector, velocity: Vector, forcing: Forcing, out: Vector) -> None:
-        """Take points (x, y) [cells] along: out = where they are a step later."""
+        """out = the points (x, y) [cells] after the step."""
         inputs = [*points, *velocity, *self._numbers(forcing)]
         transport.carry_points.launch(len(points[0]), self.device, inputs, out)
         if len(points[0]):
@@ -106,7 +110,7 @@ class Feet:
             record(backward, [*points, *velocity], out)
 
     def _carry_points_back(self, points: Vector, velocity: Vector, forcing: Forcing, out: Vector) -> None:
-        """Write the points' gradients, and add to the velocity's."""
+        """Write the gradient of the points before the step; add to the velocity's."""
         velocity_bar = bars(velocity)
         inputs = [*points, *velocity, *bars(out), *self._numbers(forcing)]
         outputs = [*velocity_bar, *bars(points)]
@@ -115,5 +119,6 @@ class Feet:
         self._fold(velocity_bar)
 
     def _fold(self, velocity_bar: Vector) -> None:
+        """Fold the ghosts of a velocity's gradient."""
         for f, ghosts in zip(velocity_bar, self._velocity_ghosts, strict=True):
             ghosts.fold(f)

@@ -1,4 +1,4 @@
-"""What acts on the fluid in one step, on the device: its length, the forces' impulses, what sources pour."""
+"""The forcing of one step on the device: the step's length, the impulses of forces, sources and growths."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ from wfluid.step.gaussians import GaussianForces, GrowthSources
 from wfluid.step.tape import bars, record
 
 _STEP = 5
-"""Numbers of the step itself: dt / h and kept / h along both axes, and kept."""
+"""Numbers of the step itself: dt / h and pressure_part / h along both axes, and pressure_part."""
 
 
 @dataclass(frozen=True, eq=False)
 class ForcingRow:
-    """What acts in one step."""
+    """The forcing of one step."""
 
     numbers: np.ndarray
-    """Of the step, the forces and the sources, as `Forcing` lays them out on the device."""
+    """The numbers of the step, the forces and the sources, in the order of `Forcing.numbers`."""
     boxes: np.ndarray
-    """Of cells that Gaussians reach."""
+    """The boxes of cells that Gaussians reach, in the order of `Forcing.boxes`."""
     prescribed: float
     """Sum of the largest divergences that growths prescribe [1/s]."""
 
 
 class Forcing:
-    """The numbers of a step with forces of certain kinds, and how they move the fluid.
+    """Applies forces and sources to the fluid, with numbers in device memory that change from step to step.
 
-    Gaussian forces with the same weight are pushed together. With `gradients` the transposes work too. With
-    `effort` they count that part of half the squares of what forces add to the velocity.
+    Gaussian forces with the same weight are one batch. With `gradients` it has transposes too. With `effort`
+    these add the gradient of effort/2 times the sum of the squared velocity changes due to forces.
     """
 
     def __init__(
@@ -63,87 +63,94 @@ class Forcing:
         effort: float = 0.0,
     ):
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
-        self._forces = tuple(forces)  # kept, so that no other object takes an identity of the key
-        walls, make = fluid.walls, (grid, fluid.walls, device, gradients)
-        pushes, growths = _by_weight(self._forces)
-        self._pushes = [GaussianForces(*group, *make) for group in pushes]
-        self._growths = [GrowthSources(*group, *make) for group in growths]
+        self._forces = tuple(forces)  # stored, so that no other object gets an id that is in the key
+        walls = fluid.boundary
+        gaussian_forces, growths = _by_weight(self._forces)
+        self._gaussian_forces = [
+            GaussianForces(*group, grid, walls, device, gradients) for group in gaussian_forces
+        ]
+        self._growths = [GrowthSources(*group, grid, walls, device, gradients) for group in growths]
         self._fields: list[tuple[int, Vector]] = []
-        self._lifts: list[tuple[int, int]] = []
+        self._buoyancies: list[tuple[int, int]] = []
         for n, force in enumerate(forces):
             if isinstance(force, FieldForce):
                 self._fields += [(n, _uploaded(f, self.layout, device)) for f in force.fields(grid, walls)]
             elif isinstance(force, Buoyancy):
-                self._lifts.append((n, _index_of(force.density, fluid.density_names)))
-        self.sources = [DensitySources(density, *make) for density in fluid.densities]
+                self._buoyancies.append((n, _index_of(force.density, fluid.density_names)))
+        self.sources = [
+            DensitySources(density, grid, walls, device, gradients) for density in fluid.densities
+        ]
         self._velocity_ghosts = [Ghosts(self.layout, r, device) for r in (walls.u_rules(), walls.v_rules())]
         self._effort, self._gained_bar = effort, vector(self.layout, device, 2) if effort else ()
-        self._lifted = field(self.layout, device) if self._lifts and gradients else None
+        if self._buoyancies and gradients:
+            self._rho_on_faces, self._face_bar = (field(self.layout, device) for _ in range(2))
         self._inner = InnerProduct(self.layout, device, 2)
         self._lay_out()
 
     sources: list[DensitySources]
-    """What pours, density by density."""
+    """The sources of each density."""
     numbers: wp.array
-    """All numbers of a step, on the device."""
+    """All numbers of a step: of the step itself, fields and buoyancies, painted sources, Gaussians."""
     boxes: wp.array
-    """All boxes of a step, on the device."""
+    """The boxes of all Gaussians in a step."""
     bars: wp.array
-    """What gradients are made of: impulses' and moments."""
+    """The transposes' results: gradients of the numbers before the Gaussians', and the Gaussians' moments."""
 
     def _lay_out(self) -> None:
-        """Allocate the arrays, and tell everything what parts of them are its own."""
-        self._groups = [*self._pushes, *self._growths]
-        blobs = [group.blobs for group in self._groups] + [p.blobs for p in self.sources if p.blobs]
-        impulses = len(self._fields) + 2 * len(self._lifts)
-        painted = sum(pouring.painted for pouring in self.sources)
+        """Allocate `numbers`, `boxes` and `bars`, and give every force and source its parts of them."""
+        self._groups: list[GaussianForces | GrowthSources] = [*self._gaussian_forces, *self._growths]
+        batches = [group.gaussians for group in self._groups]
+        batches += [sources.gaussians for sources in self.sources if sources.gaussians]
+        impulses = len(self._fields) + 2 * len(self._buoyancies)
+        painted = sum(sources.painted for sources in self.sources)
         begin = _STEP + impulses + painted
         self.numbers, self.bars = (
             zeros(size, self.device)
-            for size in (begin + sum(b.numbers for b in blobs), begin + sum(b.moments for b in blobs))
+            for size in (begin + sum(b.numbers for b in batches), begin + sum(b.moments for b in batches))
         )
-        self.boxes = zeros(sum(b.boxes for b in blobs), self.device, wp.int32)
+        self.boxes = zeros(sum(b.boxes for b in batches), self.device, wp.int32)
         step = entries(self.numbers, slice(_STEP))
-        self.dt_hx, self.dt_hy, self.kept_hx, self.kept_hy, self.kept = step
-        self._lone = slice(_STEP, _STEP + impulses)
-        self._impulses, self._impulses_bar = (entries(a, self._lone) for a in (self.numbers, self.bars))
-        at = self._lone.stop
+        self.dt_hx, self.dt_hy, self.pressure_part_hx, self.pressure_part_hy, self.pressure_part = step
+        self._impulse_slice = slice(_STEP, _STEP + impulses)
+        self._impulses = entries(self.numbers, self._impulse_slice)
+        self._impulses_bar = entries(self.bars, self._impulse_slice)
+        at = self._impulse_slice.stop
         self._painted: list[slice] = []
-        for pouring in self.sources:
-            self._painted.append(slice(at, at + pouring.painted))
-            if pouring.painted:
-                pouring.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
-            at += pouring.painted
+        for sources in self.sources:
+            self._painted.append(slice(at, at + sources.painted))
+            if sources.painted:
+                sources.bind(self.numbers[self._painted[-1]], self.bars[self._painted[-1]])
+            at += sources.painted
         number, moment, box = at, at, 0
         self._parts: dict[int, tuple[slice, slice]] = {}
-        for part in blobs:
-            numbers, moments = slice(number, number + part.numbers), slice(moment, moment + part.moments)
-            boxes = slice(box, box + part.boxes)
+        for batch in batches:
+            numbers, moments = slice(number, number + batch.numbers), slice(moment, moment + batch.moments)
+            boxes = slice(box, box + batch.boxes)
             number, moment, box = numbers.stop, moments.stop, boxes.stop
-            taken = self.bars[moments] if part.moments else None
-            part.bind(self.numbers[numbers], self.boxes[boxes], taken)
-            self._parts[id(part)] = numbers, moments
+            moment_array = self.bars[moments] if batch.moments else None
+            batch.bind(self.numbers[numbers], self.boxes[boxes], moment_array)
+            self._parts[id(batch)] = numbers, moments
 
     @staticmethod
     def key(forces: Sequence[Force]) -> tuple:
-        """What impulses are made for: forces of one key differ in numbers only."""
+        """A key by which forcings are found again: forces with the same key differ in numbers only."""
         return tuple(
             (isinstance(f, Growth), id(f.weight)) if isinstance(f, LocalForce) else (id(f),) for f in forces
         )
 
     @property
-    def pushes(self) -> bool:
-        """Whether anything adds to the velocity."""
-        return bool(self._pushes or self._fields or self._lifts)
+    def adds_velocity(self) -> bool:
+        """Whether any force adds to the velocity."""
+        return bool(self._gaussian_forces or self._fields or self._buoyancies)
 
     @property
-    def swells(self) -> bool:
+    def prescribes_divergence(self) -> bool:
         """Whether any force prescribes divergence."""
         return bool(self._growths)
 
     @property
     def removed(self) -> float:
-        """Of the divergence prescribed, what had no place: its mean, taken off everywhere [1/s]."""
+        """The mean of the prescribed divergence, which is subtracted everywhere [1/s]."""
         return float(sum(read(growths.mean)[0] for growths in self._growths))
 
     def set(
@@ -153,11 +160,11 @@ class Forcing:
         t: float,
         dt: float,
         until: float,
-        kept: float = 0.0,
-        live: bool = False,
+        pressure_part: float = 0.0,
+        act_at_zero: bool = False,
     ) -> float:
-        """Put a step on the device: what `row` finds. Returns the divergence that is prescribed [1/s]."""
-        row = self.row(forces, fluid, t, dt, until, kept, live)
+        """Upload the `row` of a step to the device. Returns the divergence it prescribes [1/s]."""
+        row = self.row(forces, fluid, t, dt, until, pressure_part, act_at_zero)
         assign(row.numbers, self.numbers)
         assign(row.boxes, self.boxes)
         return row.prescribed
@@ -169,73 +176,77 @@ class Forcing:
         t: float,
         dt: float,
         until: float,
-        kept: float = 0.0,
-        live: bool = False,
+        pressure_part: float = 0.0,
+        act_at_zero: bool = False,
     ) -> ForcingRow:
-        """What is needed for a step of dt, in which forces and the fluid's sources act from t to `until`.
+        """The forcing of a step of dt, in which forces and the fluid's sources act from t to `until`.
 
-        `kept` is the part of the last step's pressure that is taken for a first guess; none where
-        divergence is prescribed. With `live` forces count as acting even where their strengths are 0.
+        `pressure_part` is the fraction of the last step's pressure that is subtracted before the diffusion;
+        it becomes 0 where divergence is prescribed. With `act_at_zero` Gaussians of strength 0 have boxes
+        too while their envelopes act, so that gradients with respect to their strengths are computed.
 
         Raises:
             ValueError: a force that would add more than the limit, with the force and the limit.
         """
-        blobs = {
+        impulses = {
             n: force.impulse(t, until) for n, force in enumerate(forces) if isinstance(force, LocalForce)
         }
-        for blob in blobs.values():
-            if abs(blob.swell) * dt > STEP_GROWTH:
+        for impulse in impulses.values():
+            if abs(impulse.swell) * dt > STEP_GROWTH:
                 raise ValueError(
-                    f"the growth at {blob.center} would change areas by exp({blob.swell * dt:.3g}) in a step "
-                    f"of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer window help"
+                    f"the growth at {impulse.center} would change areas by exp({impulse.swell * dt:.3g}) "
+                    f"in a step of {dt:.3g} s; the limit is exp({STEP_GROWTH}): more substeps or a longer "
+                    "window help"
                 )
-            gained = max(blob.gained, abs(blob.swell) * blob.radius)
-            _check(f"the force at {blob.center}", gained, t, until)
-        prescribed = sum(abs(blob.swell) for blob in blobs.values())
-        kept = 0.0 if prescribed else kept
+            gained = max(impulse.gained, abs(impulse.swell) * impulse.radius)
+            _check(f"the force at {impulse.center}", gained, t, until)
+        prescribed = sum(abs(impulse.swell) for impulse in impulses.values())
+        pressure_part = 0.0 if prescribed else pressure_part
         hx, hy = self.grid.hx, self.grid.hy
-        numbers = [dt / hx, dt / hy, kept / hx, kept / hy, kept]
-        for n in dict.fromkeys(n for n, _ in self._fields):
-            integrals = forces[n].integrals(t, until)
-            _check("a force over the picture", forces[n].reach * math.hypot(*integrals), t, until)
-            numbers += integrals
-        for n, _ in self._lifts:
-            impulse = forces[n].envelope.integral(t, until)
-            _check("the buoyancy", np.hypot(*forces[n].vector) * abs(impulse), t, until)
-            numbers += [impulse * component for component in forces[n].vector]
-        pourings = list(zip(self.sources, fluid.densities, strict=True))
-        for pouring, density in pourings:
-            numbers += pouring.impulses(density, t, until)
+        numbers = [dt / hx, dt / hy, pressure_part / hx, pressure_part / hy, pressure_part]
+        for force in forces:
+            if isinstance(force, FieldForce):
+                integrals = force.integrals(t, until)
+                _check("a force over the picture", force.reach * math.hypot(*integrals), t, until)
+                numbers += integrals
+        for force in forces:
+            if isinstance(force, Buoyancy):
+                integral = force.envelope.integral(t, until)
+                _check("the buoyancy", np.hypot(*force.vector) * abs(integral), t, until)
+                numbers += [integral * component for component in force.vector]
+        densities = list(zip(self.sources, fluid.densities, strict=True))
+        for sources, density in densities:
+            numbers += sources.impulses(density, t, until)
         rows = []
         for group in self._groups:
-            alive = [live and forces[n].envelope.acts(t, until) for n in group.members]
-            rows.append(group.blobs.row([blobs[n] for n in group.members], alive))
-        rows += [pouring.row(density, t, until, live) for pouring, density in pourings if pouring.blobs]
+            forced = [act_at_zero and forces[n].envelope.acts(t, until) for n in group.members]
+            rows.append(group.gaussians.row([impulses[n] for n in group.members], forced))
+        rows += [sources.row(density, t, until, act_at_zero) for sources, density in densities]
         boxes = [np.empty(0, dtype=np.int32), *(boxes for _, boxes in rows)]
-        numbers = np.concatenate([numbers, *(row for row, _ in rows)])
-        return ForcingRow(numbers, np.concatenate(boxes), prescribed)
+        table = np.concatenate([numbers, *(row for row, _ in rows)])
+        return ForcingRow(table, np.concatenate(boxes), prescribed)
 
     def push(self, state: State, out: Vector) -> None:
-        """out = the state's velocity and the forces' impulses, with ghosts: launches only."""
+        """out = the state's velocity plus the impulses of forces, with ghosts: launches only."""
         for f, to in zip((state.u, state.v), out, strict=True):
             algebra.copy.launch(self.layout, self.device, [f], [to])
         impulses = iter(self._impulses)
         for (_, fields), impulse in zip(self._fields, impulses, strict=False):
             for f, component in zip(fields, out, strict=True):
                 forces.push_field.launch(self.layout, self.device, [f, impulse], [component])
-        for density, component, before, impulse in self._lifting(out):
-            inputs = [state.rho[density], impulse, before]
+        for density, component, stride, impulse in self._buoyancy_terms(out):
+            inputs = [state.rho[density], impulse, stride]
             forces.lift.launch(self.layout, self.device, inputs, [component])
-        for pushes in self._pushes:
-            pushes.add(out)
+        for group in self._gaussian_forces:
+            group.add(out)
         with together():
             for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
                 ghosts.fill(f)
-        lifting = [state.rho[density] for _, density in self._lifts]
-        record(partial(self._push_back, state, out), [state.u, state.v, *lifting], out)
+        read = [state.rho[density] for _, density in self._buoyancies]
+        record(partial(self._push_back, state, out), [state.u, state.v, *read], out)
 
     def _push_back(self, state: State, out: Vector) -> None:
-        """Add to the gradients of the state's velocity and densities; find those of the impulses."""
+        """Add to the gradients of the state's velocity and densities; compute those of the impulses."""
         out_bar, velocity = bars(out), (state.u, state.v)
         with together():
             for f, to in zip(out_bar, bars(velocity), strict=True):
@@ -249,59 +260,60 @@ class Forcing:
         impulses_bar = iter(self._impulses_bar)
         for _, fields in self._fields:
             self._inner.dot(gained_bar, fields, next(impulses_bar))
-        for density, f_bar, before, impulse in self._lifting(gained_bar):
-            rho = state.rho[density]
-            forces_adjoint.mean_with_before.launch(self.layout, self.device, [rho, before], [self._lifted])
-            self._inner.dot([f_bar], [self._lifted], next(impulses_bar))
-            algebra.copy.launch(self.layout, self.device, [f_bar], [self._lifted])
-            self._velocity_ghosts[before > 1].fill(self._lifted)
-            inputs = [self._lifted, impulse, before, self.layout.nx]
+        for density, f_bar, stride, impulse in self._buoyancy_terms(gained_bar):
+            rho, rho_on_faces, face_bar = state.rho[density], self._rho_on_faces, self._face_bar
+            forces_adjoint.mean_with_before.launch(self.layout, self.device, [rho, stride], [rho_on_faces])
+            self._inner.dot([f_bar], [rho_on_faces], next(impulses_bar))
+            algebra.copy.launch(self.layout, self.device, [f_bar], [face_bar])
+            self._velocity_ghosts[stride > 1].fill(face_bar)
+            inputs = [face_bar, impulse, stride, self.layout.nx]
             forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho.grad])
-        for pushes in self._pushes:
-            pushes.adjoint(gained_bar)
+        for group in self._gaussian_forces:
+            group.adjoint(gained_bar)
 
-    def _lifting(self, velocity: Vector) -> list[tuple[int, wp.array, int, wp.array]]:
-        """For each buoyancy and component: the density, the component, its stride and its impulse."""
-        lifting = []
-        for n, (_, density) in enumerate(self._lifts):
+    def _buoyancy_terms(self, velocity: Vector) -> list[tuple[int, wp.array, int, wp.array]]:
+        """For each buoyancy and component: the density's index, the component, its stride and its impulse."""
+        terms = []
+        for n, (_, density) in enumerate(self._buoyancies):
             impulses = self._impulses[len(self._fields) + 2 * n :][:2]
-            for component, before, impulse in zip(velocity, (1, self.layout.pitch), impulses, strict=True):
-                lifting.append((density, component, before, impulse))
-        return lifting
+            for component, stride, impulse in zip(velocity, (1, self.layout.pitch), impulses, strict=True):
+                terms.append((density, component, stride, impulse))
+        return terms
 
     def prescribe(self, b: wp.array) -> None:
-        """Add the divergence that is to stay to b = -div v, in place: launches only."""
+        """Add the prescribed divergence to b = -div v, in place: launches only."""
         for growths in self._growths:
             growths.add(b)
 
     def prescribe_adjoint(self, minus_b_bar: wp.array) -> None:
-        """The transpose of `prescribe`, from minus the gradient: launches only."""
+        """The transpose of `prescribe`, from -b_bar: launches only."""
         for growths in self._growths:
             growths.adjoint(minus_b_bar)
 
     def gradients(self, numbers: np.ndarray, bars: np.ndarray) -> dict[int, np.ndarray]:
-        """The gradients with respect to what each force does, from rows of `numbers` and `bars`, one a step.
+        """The gradients with respect to each force's impulses, from rows of `numbers` and `bars`, one a step.
 
-        By the force's number, (steps, n): of a Gaussian the numbers that `gaussian_impulse_of` knows, of a
-        field its integrals, of a buoyancy its two impulses.
+        By the force's number, (steps, n): for a Gaussian n are the numbers of `gaussian_impulse_of`, for a
+        field its integrals, for a buoyancy its two impulses.
         """
         found: dict[int, np.ndarray] = {}
         for group in self._groups:
-            own, moments = self._parts[id(group.blobs)]
-            table = group.gradient(numbers[:, own], bars[:, moments])
+            columns, moments = self._parts[id(group.gaussians)]
+            table = group.gradient(numbers[:, columns], bars[:, moments])
             found.update((n, table[:, :, place].T) for place, n in enumerate(group.members))
-        members = [n for n, _ in self._fields] + [n for n, _ in self._lifts for _ in range(2)]
+        members = [n for n, _ in self._fields] + [n for n, _ in self._buoyancies for _ in range(2)]
         for n in dict.fromkeys(members):
-            columns = [place for place, member in enumerate(members) if member == n]
-            found[n] = bars[:, self._lone][:, columns].astype(np.float64)
+            places = [place for place, member in enumerate(members) if member == n]
+            found[n] = bars[:, self._impulse_slice][:, places].astype(np.float64)
         return found
 
     def source_gradients(self, numbers: np.ndarray, bars: np.ndarray) -> list[dict[int, np.ndarray]]:
         """The same for the sources of each density."""
         found = []
-        for pouring, painted in zip(self.sources, self._painted, strict=True):
-            own, moments = self._parts[id(pouring.blobs)] if pouring.blobs else (slice(0), slice(0))
-            found.append(pouring.gradients(numbers[:, own], bars[:, moments], bars[:, painted]))
+        for sources, painted in zip(self.sources, self._painted, strict=True):
+            batch = sources.gaussians
+            columns, moments = self._parts[id(batch)] if batch else (slice(0), slice(0))
+            found.append(sources.gradients(numbers[:, columns], bars[:, moments], bars[:, painted]))
         return found
 
 
@@ -309,7 +321,7 @@ _Groups = list[tuple[Painted | None, list[int]]]
 
 
 def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
-    """The weights of Gaussian pushes, and of growths, each with the numbers of its forces."""
+    """Gaussian forces, and growths, grouped by weight: each weight with the numbers of its forces."""
     found: tuple[dict, dict] = {}, {}
     for n, force in enumerate(forces):
         if isinstance(force, LocalForce):
@@ -319,6 +331,7 @@ def _by_weight(forces: Sequence[Force]) -> tuple[_Groups, _Groups]:
 
 
 def _index_of(name: str, densities: Sequence[str]) -> int:
+    """The index of the density that a buoyancy reads."""
     if name not in densities:
         there = ", ".join(densities) or "none"
         raise ValueError(f"buoyancy reads the density {name!r}: expected one of the fluid's ({there})")
@@ -326,6 +339,7 @@ def _index_of(name: str, densities: Sequence[str]) -> int:
 
 
 def _check(what: str, gained: float, t: float, until: float) -> None:
+    """Refuse a force that adds more velocity in a step than the limit."""
     if not gained <= FORCE_LIMIT * STEP_LIMIT:
         raise ValueError(
             f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
@@ -334,6 +348,7 @@ def _check(what: str, gained: float, t: float, until: float) -> None:
 
 
 def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:
+    """The two components of a field, on the device, without ghosts."""
     fields = vector(layout, device, 2)
     for value, f in zip(values, fields, strict=True):
         from_numpy(value, f, layout)

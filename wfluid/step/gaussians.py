@@ -1,4 +1,4 @@
-"""Gaussians on the device: profiles, boxes of cells, and the forces and growths made of them."""
+"""Gaussians on the device: their profiles and boxes of cells, and the forces and growths they make up."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from wfluid.model.force import GaussianImpulse
 from wfluid.model.painted import Painted
 
 _NUMBERS = 8
-"""Of a blob on the device: center (2), radius, push (2), turn, swell, amount."""
+"""Numbers of a Gaussian on the device: center (2), radius, push (2), turn, swell, amount."""
 
 _FIELDS = 2
-"""Fields that moments are taken of: a velocity has two."""
+"""Fields with moments: the two components of a velocity."""
 
 
 def gaussian_impulse_of(row: Sequence[float]) -> GaussianImpulse:
-    """The numbers of one Gaussian, or the gradients with respect to them, in words."""
+    """The numbers of one Gaussian, or the gradients with respect to them, by name."""
     center_x, center_y, radius, push_x, push_y, turn, swell, amount = map(float, row)
     return GaussianImpulse((center_x, center_y), radius, (push_x, push_y), turn, swell, amount)
 
 
 class GaussianBatch:
-    """A number of Gaussians whose places, sizes and strengths change from step to step.
+    """Gaussians whose centers, radii and strengths change from step to step.
 
-    What they are in a step is a row of numbers and one of boxes, which `row` finds and `bind` says where on
-    the device to look for.
+    `row` computes the numbers and boxes of a step. `bind` sets the device arrays from which the launches
+    read them.
     """
 
     def __init__(self, count: int, grid: Grid, walls: Walls, device: wp.Device, gradients: bool = False):
@@ -55,10 +55,10 @@ class GaussianBatch:
     boxes: int
     """Entries of a row of boxes."""
     moments: int
-    """Entries of a row of moments, which gradients are made of."""
+    """Entries of a row of moments, from which gradients are computed."""
 
     def bind(self, numbers: wp.array, boxes: wp.array, moments: wp.array | None) -> None:
-        """Read and write from now on in these arrays; no moments where there are no gradients."""
+        """Set the arrays of numbers, boxes and moments; the latter None without gradients."""
         count = self.count
         self._center_x, self._center_y, self._radius, *self._strengths = (
             numbers[n * count : (n + 1) * count] for n in range(_NUMBERS)
@@ -69,20 +69,20 @@ class GaussianBatch:
             self._moments = [moments[n * size : (n + 1) * size] for n in range(_FIELDS)]
 
     def row(
-        self, blobs: Sequence[GaussianImpulse], live: Sequence[bool] = ()
+        self, impulses: Sequence[GaussianImpulse], forced: Sequence[bool] = ()
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers and the boxes of what they do in a step.
+        """The numbers and the boxes of a step with these impulses.
 
-        Those that are `live` act even where their strengths are 0, for the gradients with respect to these.
+        Those `forced` have a box even if their strengths are 0, for the gradients with respect to these.
         """
-        rows = [(*b.center, b.radius, *b.push, b.turn, b.swell, b.amount) for b in blobs]
+        rows = [(*g.center, g.radius, *g.push, g.turn, g.swell, g.amount) for g in impulses]
         table = np.array(rows).reshape(self.count, _NUMBERS).T
         acting = np.any(table[3:], axis=0)
-        boxes = self._boxed(table, acting | np.array(live) if live else acting)
+        boxes = self._boxed(table, acting | np.array(forced) if forced else acting)
         return np.ascontiguousarray(table).ravel(), boxes.ravel()
 
     def _boxed(self, table: np.ndarray, acting: np.ndarray) -> np.ndarray:
-        """The box of each, (blobs, 4), empty where it does not act: cells with a face or centre in reach."""
+        """The box of each Gaussian, (count, 4): the cells it reaches; empty if it does not act."""
         boxes = np.zeros((self.count, 4), dtype=np.int32)
         reach = float(forces.CUT) * table[2]
         for n, (axis, center) in enumerate(zip((self._x, self._y), table, strict=False)):
@@ -95,7 +95,7 @@ class GaussianBatch:
         return boxes
 
     def push(self, velocity: Vector) -> None:
-        """Add their pushes and turns to the velocity, in place: launches only."""
+        """Add the pushes and turns to the velocity, in place: launches only."""
         x, y = self._x, self._y
         self._profile(faces=True)
         self._profile()
@@ -111,19 +111,19 @@ class GaussianBatch:
         forces.push.launch(self.layout, self.device, inputs, velocity, boxes=self._boxes)
 
     def swell(self, s: wp.array) -> None:
-        """Add the divergence they prescribe to a field, in place: launches only."""
+        """Add the prescribed divergence to a field, in place: launches only."""
         (r_x, g_x), (r_y, g_y) = self._profile()
         inputs = [self._strengths[3], g_x, g_y, r_x, r_y, self._x.layout.pitch, self._y.layout.pitch]
         sources.swell.launch(self.layout, self.device, inputs, [s], boxes=self._boxes)
 
     def pour(self, rho: wp.array) -> None:
-        """Add their amounts to a density, in place: launches only."""
+        """Add the amounts to a density, in place: launches only."""
         (_, g_x), (_, g_y) = self._profile()
         inputs = [self._strengths[4], g_x, g_y, self._x.layout.pitch, self._y.layout.pitch]
         sources.pour.launch(self.layout, self.device, inputs, [rho], boxes=self._boxes)
 
     def measure_push(self, velocity_bar: Vector) -> None:
-        """Take the moments of the gradient with respect to what `push` adds to: launches only."""
+        """Compute the moments of the gradient with respect to the velocity after `push`: launches only."""
         self._profile(faces=True)
         self._profile()
         x, y = self._x, self._y
@@ -131,19 +131,20 @@ class GaussianBatch:
         self._measure(1, velocity_bar[1], x.at_centres, y.on_faces)
 
     def measure_centres(self, f_bar: wp.array) -> None:
-        """The same for `swell` and `pour`, which add to a field at centres: launches only."""
+        """Compute the moments of the gradient after `swell` or `pour`, a field at centres: launches only."""
         self._measure(0, f_bar, *self._profile())
 
-    def _measure(self, slot: int, f_bar: wp.array, x: Vector, y: Vector) -> None:
+    def _measure(self, component: int, f_bar: wp.array, x: Vector, y: Vector) -> None:
+        """Compute the moments of f_bar with the profiles x and y, as those of a `component`."""
         (r_x, g_x), (r_y, g_y) = x, y
         ny, count, device = self.layout.ny, self.count, self.device
         inputs = [f_bar, g_x, r_x, self._boxes, ny, self.layout.pitch, self._x.layout.pitch]
         forces_adjoint.row_moments.launch(count * ny, device, inputs, [self._sums])
         inputs = [self._sums, g_y, r_y, self._boxes, ny, self._y.layout.pitch]
-        forces_adjoint.moments.launch(count, device, inputs, [self._moments[slot]])
+        forces_adjoint.moments.launch(count, device, inputs, [self._moments[component]])
 
     def push_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
-        """The gradients with respect to rows of numbers, from these and the moments `measure_push` took."""
+        """The gradients with respect to rows of numbers, from these and the moments of `measure_push`."""
         table, (u, v) = self._tables(numbers, moments)
         sigma, px, py, turn = table[2:6]
         # the velocity gained is (px - turn r_y) g on x-faces and (py + turn r_x) g on y-faces
@@ -156,7 +157,7 @@ class GaussianBatch:
         return out
 
     def swell_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
-        """The same for `swell`, from what `measure_centres` took."""
+        """The same for `swell`, from the moments of `measure_centres`."""
         table, (s, _) = self._tables(numbers, moments)
         sigma, rate = table[2], table[6]
         # the divergence is rate (1 - r^2 / 2) g
@@ -168,7 +169,7 @@ class GaussianBatch:
         return out
 
     def pour_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
-        """The same for `pour`, from what `measure_centres` took."""
+        """The same for `pour`, from the moments of `measure_centres`."""
         table, (s, _) = self._tables(numbers, moments)
         sigma, amount = table[2], table[7]
         out = np.zeros_like(table)
@@ -177,13 +178,13 @@ class GaussianBatch:
         return out
 
     def _tables(self, numbers: np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, list[_Moments]]:
-        """Rows (steps, …) as numbers by kind (8, steps, blobs), and the moments of either field."""
+        """Rows (steps, …) as numbers by kind (8, steps, count), and the moments of both fields."""
         table = numbers.reshape(len(numbers), _NUMBERS, self.count).swapaxes(0, 1).astype(np.float64)
         fields = moments.reshape(len(moments), _FIELDS, self.count, -1).astype(np.float64)
         return table, [_Moments(fields[:, n]) for n in range(_FIELDS)]
 
     def _profile(self, faces: bool = False) -> tuple[Vector, Vector]:
-        """Compute, and return, distances and Gaussians of both axes, at faces or at centres."""
+        """Compute the profiles along both axes, at faces or at centres. Returns those at centres."""
         for axis, center in ((self._x, self._center_x), (self._y, self._center_y)):
             start, out = (0.0, axis.on_faces) if faces else (0.5, axis.at_centres)
             inputs = [center, self._radius, start, axis.h, axis.period]
@@ -192,7 +193,7 @@ class GaussianBatch:
 
 
 class _Profiles:
-    """Profiles along one axis: distances [radii] and Gaussians, at faces and at centres, blob by blob."""
+    """Profiles along one axis: for each Gaussian its distances r [radii] and values, at faces and centres."""
 
     def __init__(self, count: int, points: int, h: float, period: float, device: wp.Device):
         self.points, self.h, self.period = points, h, period
@@ -201,24 +202,24 @@ class _Profiles:
 
 
 class _Moments:
-    """M_ab of every Gaussian in every step (`kernels/adjoint/forces.py`), (steps, blobs)."""
+    """M_ab of every Gaussian in every step (`kernels/adjoint/forces.py`), (steps, count)."""
 
     def __init__(self, values: np.ndarray):
         self._values, orders = values, range(forces_adjoint.ORDERS)
         self._places = [(a, b) for a in orders for b in orders if a + b < len(orders)]
 
     def __call__(self, a: int, b: int) -> np.ndarray:
-        """Of r_x^a r_y^b g."""
+        """The moment with r_x^a r_y^b g."""
         return self._values[..., self._places.index((a, b))]
 
     @property
     def square(self) -> np.ndarray:
-        """Of |r|^2 g."""
+        """The moment with |r|^2 g."""
         return self(2, 0) + self(0, 2)
 
 
 class _Weighted:
-    """Forces `members`, counted among all, with one weight."""
+    """Gaussian forces or growths with one weight; `members` are their numbers among all forces."""
 
     def __init__(
         self,
@@ -230,7 +231,7 @@ class _Weighted:
         gradients: bool,
     ):
         self.members, self.device, self.layout = members, device, Layout(grid.nx, grid.ny)
-        self.blobs = GaussianBatch(len(members), grid, walls, device, gradients)
+        self.gaussians = GaussianBatch(len(members), grid, walls, device, gradients)
         self._weights = None
         if weight is not None:
             self._weights = field(self.layout, device)
@@ -239,69 +240,75 @@ class _Weighted:
 
 
 class GaussianForces(_Weighted):
-    """Gaussian forces with one weight."""
+    """Gaussian forces with one weight.
+
+    A weighted force is first computed without its weight, in a scratch array that `adjoint` uses too.
+    """
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
-        self._gained = vector(self.layout, self.device, 2) if self._weights is not None else ()
+        self._scratch = vector(self.layout, self.device, 2) if self._weights is not None else ()
 
     def add(self, velocity: Vector) -> None:
-        """Add what they gain to the velocity, in place: launches only."""
-        if not self._gained:
-            self.blobs.push(velocity)
+        """Add the forces to the velocity, in place: launches only."""
+        if not self._scratch:
+            self.gaussians.push(velocity)
             return
-        gained = self._gained
-        alone(lambda: fill(0.0, *gained))
-        self.blobs.push(gained)
-        for f, component, before in zip(gained, velocity, (1, self.layout.pitch), strict=True):
-            inputs = [f, self._weights, before]
+        unweighted = self._scratch
+        alone(lambda: fill(0.0, *unweighted))
+        self.gaussians.push(unweighted)
+        for f, component, stride in zip(unweighted, velocity, (1, self.layout.pitch), strict=True):
+            inputs = [f, self._weights, stride]
             forces.push_weighted.launch(self.layout, self.device, inputs, [component])
 
     def adjoint(self, velocity_bar: Vector) -> None:
-        """The transpose of `add`, down to the moments of the Gaussians: launches only."""
-        if self._gained:
-            for f_bar, gained, before in zip(velocity_bar, self._gained, (1, self.layout.pitch), strict=True):
-                inputs = [f_bar, self._weights, before]
-                forces_adjoint.weighted.launch(self.layout, self.device, inputs, [gained])
-        self.blobs.measure_push(self._gained or velocity_bar)
+        """The transpose of `add`, as far as the moments of the Gaussians: launches only."""
+        if self._scratch:
+            for f_bar, to, stride in zip(velocity_bar, self._scratch, (1, self.layout.pitch), strict=True):
+                inputs = [f_bar, self._weights, stride]
+                forces_adjoint.weighted.launch(self.layout, self.device, inputs, [to])
+        self.gaussians.measure_push(self._scratch or velocity_bar)
 
     def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
-        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
-        return self.blobs.push_gradient(numbers, moments)
+        """The gradient with respect to rows of numbers, from the moments of `adjoint`."""
+        return self.gaussians.push_gradient(numbers, moments)
 
 
 class GrowthSources(_Weighted):
-    """Growths with one weight: their divergence is a field first, of which the mean is taken off."""
+    """Growths with one weight. Their divergence is computed as a field, and its mean is subtracted."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
-        self._swell = field(self.layout, self.device)
-        self._inner, self.mean = InnerProduct(self.layout, self.device), zeros(1, self.device)
+        self._scratch = field(self.layout, self.device)
+        self._inner = InnerProduct(self.layout, self.device)
+        self.mean, self._bar_mean = zeros(1, self.device), zeros(1, self.device)
 
     mean: wp.array
-    """What was taken off [1/s]."""
+    """The mean that the last `add` subtracted [1/s]."""
 
     def add(self, b: wp.array) -> None:
-        """Add what they prescribe to b, in place: launches only."""
-        alone(lambda: fill(0.0, self._swell))
-        self.blobs.swell(self._swell)
+        """Add the prescribed divergence to b, in place: launches only."""
+        s = self._scratch
+        alone(lambda: fill(0.0, s))
+        self.gaussians.swell(s)
         if self._weights is not None:
-            algebra.multiply.launch(self.layout, self.device, [self._swell, self._weights], [self._swell])
-        self._add_balanced(self._swell, b)
+            algebra.multiply.launch(self.layout, self.device, [s, self._weights], [s])
+        self._add_balanced(s, self.mean, b)
 
-    def _add_balanced(self, s: wp.array, b: wp.array) -> None:
-        self._inner.mean(s, self.mean)
-        sources.add_balanced.launch(self.layout, self.device, [s, self.mean], [b])
+    def _add_balanced(self, s: wp.array, mean: wp.array, b: wp.array) -> None:
+        """mean = the mean of s; b += s - mean."""
+        self._inner.mean(s, mean)
+        sources.add_balanced.launch(self.layout, self.device, [s, mean], [b])
 
     def adjoint(self, minus_b_bar: wp.array) -> None:
-        """The transpose of `add`, down to the moments of the Gaussians, all with minus: launches only."""
-        minus_s_bar = self._swell
+        """The transpose of `add`, as far as minus the moments of the Gaussians: launches only."""
+        minus_s_bar = self._scratch
         alone(lambda: fill(0.0, minus_s_bar))
-        self._add_balanced(minus_b_bar, minus_s_bar)
+        self._add_balanced(minus_b_bar, self._bar_mean, minus_s_bar)
         if self._weights is not None:
             algebra.multiply.launch(self.layout, self.device, [minus_s_bar, self._weights], [minus_s_bar])
-        self.blobs.measure_centres(minus_s_bar)
+        self.gaussians.measure_centres(minus_s_bar)
 
     def gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
-        """The gradient with respect to rows of numbers, from the moments `adjoint` took."""
-        return -self.blobs.swell_gradient(numbers, moments)
+        """The gradient with respect to rows of numbers, from the moments of `adjoint`."""
+        return -self.gaussians.swell_gradient(numbers, moments)

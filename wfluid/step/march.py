@@ -1,4 +1,4 @@
-"""Steps in a row, to and fro between two states."""
+"""A series of steps, which alternates between two states."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from wfluid.model.force import Force
 from wfluid.step.solver import Solver
 
 Advance = Callable[[State, State, int], None]
-"""Writes the state after a step: from the state before, to the state after, which step."""
+"""Takes a step: arguments are the state before, the state after (written) and the step's number."""
 
 
 def march(now: State, spare: State, steps: Iterable[int], advance: Advance) -> Iterator[tuple[State, State]]:
-    """Take steps one after the other; after each, the fluid as it is and the state written over next."""
+    """Take steps. After each, yields the current state, and the state that the next step overwrites."""
     for step in steps:
         advance(now, spare, step)
         now, spare = spare, now
@@ -22,7 +22,7 @@ def march(now: State, spare: State, steps: Iterable[int], advance: Advance) -> I
 
 
 def steps_of(solver: Solver, timeline: Timeline, forces: Sequence[Force]) -> Advance:
-    """The steps of a timeline under forces, for `march`."""
+    """A function for `march` that takes the steps of a timeline under forces."""
 
     def advance(state_in: State, state_out: State, step: int) -> None:
         t, until = timeline.time_of(step), timeline.time_of(step + 1)

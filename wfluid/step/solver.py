@@ -1,4 +1,4 @@
-"""Steps fluids: plans each step, captures it as a graph, replays it, and says what its solves left."""
+"""Steps fluids: plans each step, captures it as a graph, replays it, and reports its residuals."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ from wfluid.step.forcing import Forcing
 from wfluid.step.step import Step
 
 REPLAYS_KEPT = 16
-"""Pairs of states whose steps are kept captured; the oldest goes first."""
+"""Number of captured steps that are kept; the one that was used least recently is dropped first."""
 
 
 @dataclass(frozen=True)
 class SolveReport:
-    """What the last step's solves left."""
+    """The residuals of the last step's solves."""
 
     pressure: Residual
-    """Of the projection: the divergence left, as iterations and norms."""
+    """Of the projection: iterations, and norms of the remaining divergence."""
     diffusion: Residual
-    """Of the diffusion, relative to the change it made; of u alone where the components are apart."""
+    """Of the diffusion, relative to the change it made; of u only, where u and v are solved separately."""
     divergence: float
-    """Largest |div v| left, beside what is prescribed [1/s]."""
+    """Largest |div v - s| after the step, s the prescribed divergence [1/s]."""
     prescribed: float = 0.0
-    """Sum of the largest divergences that sources prescribed [1/s]."""
+    """Sum of the largest divergences that growths prescribed [1/s]."""
     removed: float = 0.0
-    """The mean of what they prescribed, taken off everywhere: it has no place between walls [1/s]."""
+    """Mean of the prescribed divergence, subtracted everywhere: walls and seams let no volume out [1/s]."""
 
 
 class Solver:
-    """Steps fluids of one grid and one kind on one device.
+    """Steps one fluid on one grid and device.
 
-    Building one loads the kernels. For each pair of states stepped between, the step is captured as
-    a graph and replayed from then on; the time, the step and the forces' numbers are read from device
-    memory. On a CPU with free cores two threads share the rows of every stage, with the same bits as one. A
-    solver is for one thread at a time; several may each have their own.
+    The constructor loads the kernels. For each pair of states, the first step from one to the other is
+    captured as a graph, which later steps replay: they read the step's length and the forces' numbers from
+    device memory. On a CPU with free cores two threads share the rows of every stage; the results have the
+    same bits as with one. One thread at a time may use a solver; other threads may use solvers of their own.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
@@ -65,9 +65,9 @@ class Solver:
         self._pool = self._step.helpers()
 
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
-        """A new state: a still fluid under an untouched picture, with its densities as they begin.
+        """A new state: fluid at rest, undistorted picture, initial densities.
 
-        `points` (n, 2) are places x, y of the picture [longer side] that are followed.
+        `points` (n, 2) are positions x, y in the picture [longer side] that the flow moves along.
 
         Raises:
             ValueError: points that are not (n, 2) finite numbers within the picture.
@@ -86,7 +86,7 @@ class Solver:
         return state
 
     def set_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
-        """Give `state` the face velocities u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        """Set the face velocities of `state`: u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
         self._check(state)
         for values, f, ghosts in zip((u, v), (state.u, state.v), self._step.velocity_ghosts, strict=True):
             from_numpy(values, f, self.layout)
@@ -94,7 +94,7 @@ class Solver:
         fill(0.0, state.q)
 
     def set_map(self, state: State, displacement: np.ndarray) -> None:
-        """Give `state` the displacement (ny, nx, 2) of a map [longer side]."""
+        """Set the map of `state` from its displacement (ny, nx, 2) [longer side]."""
         self._check(state)
         cells = displacement / (self.grid.hx, self.grid.hy)
         for n, (f, ghosts) in enumerate(zip((state.d_x, state.d_y), self._step.moved_ghosts, strict=True)):
@@ -113,12 +113,12 @@ class Solver:
     ) -> None:
         """Advance `state_in` at time t by dt into `state_out`, another state.
 
-        Forces act from t to `until`: t + dt unless the very number is given at which the next step
-        begins, so that rounding lets no instant fall between two steps.
+        Forces act from t to `until`, by default t + dt. Give the exact number at which the next step begins:
+        then rounding leaves no gap between two steps.
 
         Raises:
-            ValueError: dt negative, not finite or above 10 s; the two states are one, or of another grid
-                or device; a force whose impulse is not finite or beyond the limit.
+            ValueError: dt negative, not finite or above 10 s; the two states are the same, or of another
+                grid or device; a force whose impulse is not finite or beyond the limit.
         """
         if not (math.isfinite(dt) and 0 <= dt <= STEP_LIMIT):
             raise ValueError(f"step of {dt} s: expected 0 … {STEP_LIMIT:g}")
@@ -137,11 +137,10 @@ class Solver:
         dt: float,
         until: float,
     ) -> CapturedGraph:
-        """The step, captured at first, with its numbers put where it reads them."""
+        """The captured step, its numbers uploaded to device memory."""
         step, forcing = self._step, self._forcing_for(forces)
-        swelled = self._prescribed > 0
-        kept = step.kept(dt, self._last_dt, swelled)
-        self._prescribed = forcing.set(forces, self.fluid, t, dt, until, kept)
+        pressure_part = step.pressure_part(dt, self._last_dt, self._prescribed > 0)
+        self._prescribed = forcing.set(forces, self.fluid, t, dt, until, pressure_part)
         self._last_forcing, self._last_dt = forcing, dt
         plan = step.plan(until, dt, self._prepare)
         key = (id(state_in), id(state_out), id(forcing), plan)
@@ -155,22 +154,22 @@ class Solver:
         return self._replays[key][0]
 
     def _prepare(self) -> None:
-        """Bring what depends on the medium up to date."""
+        """Replay `Step.update_coefficients`."""
         if self._preparation is None:
-            self._preparation = CapturedGraph(self.device, self._step.follow_medium, self._pool)
+            self._preparation = CapturedGraph(self.device, self._step.update_coefficients, self._pool)
         self._preparation.launch()
 
     def report(self) -> SolveReport:
-        """Measure what the last step's solves left: true residuals and the divergence."""
+        """Measure the true residuals and the divergence of the last step."""
         step = self._step
         pressure, divergence = step.projection.measure()
         removed = self._last_forcing.removed if self._last_forcing else 0.0
         return SolveReport(pressure, step.diffusion.measure(), divergence, self._prescribed, removed)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
-        """Only carry the map along `state_in`'s velocity for dt, against it where that is negative.
+        """Only carry the map along `state_in`'s velocity for dt, which may be negative.
 
-        The velocity of `state_out` is untouched.
+        The velocity of `state_out` does not change.
         """
         self._check(state_in, state_out)
         forcing = self._forcing_for(())
@@ -179,27 +178,27 @@ class Solver:
         self._step.carry_map(state_in, foot, state_out)
 
     def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
-        """Only diffuse the velocity for dt, from time t on; the map of `state_out` is untouched."""
+        """Only diffuse the velocity for dt, from time t on. The map of `state_out` does not change."""
         self._check(state_in, state_out)
         step = self._ready(state_in, t + dt, dt)
         for f, out in zip(step.diffuse((state_in.u, state_in.v)), (state_out.u, state_out.v), strict=True):
             copy(f, out)
 
     def project(self, state_in: State, state_out: State, dt: float = 0.0) -> None:
-        """Only project the velocity, as in a step of dt; the map of `state_out` is untouched."""
+        """Only project the velocity, as in a step of dt. The map of `state_out` does not change."""
         self._check(state_in, state_out)
         step = self._ready(state_in, 0.0, dt)
         step.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
     def _ready(self, state: State, t: float, dt: float) -> Step:
-        """The step, ready for one of its stages alone."""
+        """The step, set up so that a single stage can run."""
         self._step.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
-            self._step.follow_medium(state)
+            self._step.update_coefficients(state)
         return self._step
 
     def _check(self, *states: State) -> None:
-        """Refuse states whose arrays are not this solver's size, or not on its device."""
+        """Refuse states of another grid or device, or with other numbers of densities or points."""
         for state in states:
             if state.grid != self.grid or state.u.device != self.device:
                 raise ValueError(f"a state of {state.grid} on {state.u.device} in a solver of {self.grid}")

@@ -5,11 +5,11 @@
     v3 - dt div (2 mu S) + dt alpha v3 = v2  diffusion and drag, implicit Euler, S the strain of v3
     v4 = v3 - beta grad q,  div beta grad q = div v3 - s,  beta = 1 / (1 + dt alpha)  projection
 
-s is the divergence that sources prescribe, as a rule 0.
+s is the divergence that growths prescribe; it is 0 without growths.
 
-The foot is traced through v0, which is free of divergence, and carries the map along: v1 is not, and
-would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1; the two differ by
-O(dt^2) a step.
+The foot is traced through v0, which is free of divergence; the map is carried from the same foot. v1 has
+divergence and would compress the picture (Bridson, 2nd ed., section 3.1). The paper traces v1. The two
+differ by O(dt^2) a step.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from functools import partial
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Vector, fill, vector, where
+from wfluid.fields.arrays import Vector, fill, lookup_args, vector
 from wfluid.fields.device import load_kernels
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
@@ -39,34 +39,33 @@ from wfluid.step.tape import attach_gradients, bars, record
 from wfluid.system.threads import ThreadTeam, free_cores, helpers
 
 STEP_THREADS = 2
-"""Threads that share a step on a CPU: more wait for memory."""
+"""Threads that share a step on a CPU. More threads would only wait for memory."""
 
 SHARED_CELLS = 300 * 300
-"""Cells from which on sharing a step gains more than the threads lose where other work runs beside it."""
+"""Least number of cells for which sharing a step is faster while the process does other work as well."""
 
 SHARED_ALONE = 160 * 160
-"""The same where no other work does: in the evaluations of an optimisation."""
+"""The same while the process does no other work, as in the evaluations of an optimisation."""
 
 COUPLED_WORK = 4
-"""Times as much work that a coupled diffusion makes of a step."""
+"""Cost of a step with coupled diffusion, relative to a step without."""
 
 
 class Step:
-    """A step's stages and what they work with. They only launch, so that a graph may capture them.
+    """The stages of a step, with the arrays they work in. They only launch, so a graph can capture them.
 
-    On the tape that is recording each stage leaves its transpose (`tape`). A step so recorded may be gone
-    back through later, after others: `recompute` finds again what the transposes read, and
-    `tape.backward()` goes from the gradients of the state after it to those of the state before it, of the
-    forces and of the viscosity. A linear solve with a symmetric solver is its own transpose, so that none
-    of its sweeps or iterates is recorded; conjugate gradients are so only up to their tolerance.
-
-    Conjugate gradients go to the fluid's tolerances, or to `jump_tolerance` where that is lower.
+    While a tape is recording, each stage puts its transpose on it (`tape`). The backward pass of a step may
+    run later, after other steps: first `recompute` restores what the transposes read, then
+    `tape.backward()` computes the gradients with respect to the state before the step, the forces and the
+    viscosity, from those with respect to the state after it. A symmetric linear solver is its own
+    transpose, so no sweep or iterate of a solve is recorded. For conjugate gradients that holds up to their
+    tolerance: the fluid's own, or `jump_tolerance` where that is lower.
     """
 
     def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, jump_tolerance: float = 1.0):
         self.grid, self.fluid, self.device = grid, fluid, device
         self.layout = Layout(grid.nx, grid.ny)
-        walls = fluid.walls
+        walls = fluid.boundary
         self.velocity_ghosts = [
             Ghosts(self.layout, rules, device) for rules in (walls.u_rules(), walls.v_rules())
         ]
@@ -74,18 +73,18 @@ class Step:
             Ghosts(self.layout, rules, device)
             for rules in (walls.displacement_x_rules(), walls.displacement_y_rules())
         ]
-        self.where = where(grid, walls, self.layout)
-        self.feet, self.advection = (
-            kind(grid, fluid, device, self.velocity_ghosts, self.moved_ghosts) for kind in (Feet, Advection)
-        )
-        self.medium = None if fluid.separable else Coefficients(grid, fluid, device)
+        self.lookup_args = lookup_args(grid, walls, self.layout)
+        ghosts = self.velocity_ghosts, self.moved_ghosts
+        self.feet = Feet(grid, fluid, device, *ghosts)
+        self.advection = Advection(grid, fluid, device, *ghosts)
+        self.coefficients = None if fluid.separable else Coefficients(grid, fluid, device)
         self.diffusion = (
-            CoupledDiffusion(fluid, self.medium, device, jump_tolerance)
-            if self.medium
+            CoupledDiffusion(fluid, self.coefficients, device, jump_tolerance)
+            if self.coefficients
             else SeparateDiffusion(grid, fluid, device)
         )
-        resisting = self.medium if fluid.freeze else None
-        self.projection = Projection(grid, fluid, resisting, device, self.velocity_ghosts, jump_tolerance)
+        drag = self.coefficients if fluid.freeze else None
+        self.projection = Projection(grid, fluid, drag, device, self.velocity_ghosts, jump_tolerance)
         self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
         self.pushed = vector(self.layout, device, 2)
         self._solves: tuple = ()
@@ -94,16 +93,19 @@ class Step:
     """The velocity after the forces of the last step that had any, with ghosts."""
 
     def advance(self, state_in: State, state_out: State, forcing: Forcing) -> None:
-        """The step: launches only, recorded on the tape that is recording."""
+        """Write the state after the step to `state_out`: launches only; a tape that records takes them.
+
+        The last record is the first to play: it sets gradients to 0 to which several stages add.
+        """
         if self.fluid.viscosity_moves:
-            self.follow_medium(state_in)
+            self.update_coefficients(state_in)
         self.carry_points(state_in, state_out, forcing)
         foot = self.trace(state_in, forcing)
         self.carry_densities(state_in, foot, forcing, state_out)
         self.carry_map(state_in, foot, state_out)
         velocity = self.viscous(state_in, foot, forcing)
         self.project(velocity, (state_out.u, state_out.v), forcing)
-        if self.medium:
+        if self.coefficients:
             self.projection.add_pressure(state_in.q, forcing, state_out.q)
         record(partial(self._clear_gradients, state_in), (), ())
 
@@ -111,17 +113,17 @@ class Step:
         """The velocity after forces, advection and diffusion, with ghosts."""
         velocity = self.push(state, forcing)
         velocity = self.advect(velocity, foot)
-        if self.medium:
+        if self.coefficients:
             velocity = self.projection.subtract_pressure(velocity, state.q, forcing)
         return self.diffuse(velocity)
 
     def recompute(self, state: State, forcing: Forcing) -> None:
-        """Find again what the transposes of the step from `state` read, beside `state`: launches only.
+        """Compute again what the transposes of the step from `state` read besides it: launches only.
 
-        No solve, unless the gradient with respect to viscosity is wanted, which reads the velocity diffused.
+        Nothing is solved, except for the gradient with respect to viscosity: it reads the diffused velocity.
         """
         if self.fluid.viscosity_moves:
-            self.follow_medium(state)
+            self.update_coefficients(state)
         foot = self.trace(state, forcing)
         if self._of_viscosity:
             self.viscous(state, foot, forcing)
@@ -129,123 +131,146 @@ class Step:
             self.push(state, forcing)
 
     def allow_gradients(self, of_viscosity: bool = False) -> None:
-        """Allocate what the transposes need, unless it is there, and load their kernels.
+        """Allocate the arrays of the transposes, once, and load their kernels.
 
-        With `of_viscosity` the gradient with respect to viscosity is found as well, which is right only as
-        far as the diffusion is solved. A viscosity that moves needs it in any case.
+        With `of_viscosity` the backward pass also computes the gradient with respect to viscosity. It is as
+        accurate as the solve of the diffusion. A viscosity that moves needs it in any case.
         """
         load_kernels(self.device, ADJOINT)
         self._of_viscosity = of_viscosity or self.fluid.viscosity_moves
         self.diffusion.allow_gradients(self._of_viscosity)
         if self.pushed[0].grad is not None:
             return  # captured graphs know the arrays by their addresses
-        attach_gradients(self.pushed, self.layout)
-        if self.medium:
-            self.medium.allow_gradients()
-        for stage in (self.feet, self.advection, self.projection, *self.densities):
-            stage.allow_gradients()
+        attach_gradients(self.pushed, self.layout, self.device)
+        if self.coefficients:
+            self.coefficients.allow_gradients()
+        self.feet.allow_gradients()
+        self.advection.allow_gradients()
+        self.projection.allow_gradients()
+        for density in self.densities:
+            density.allow_gradients()
 
     def _clear_gradients(self, state: State) -> None:
-        """Let the gradients that several stages add to begin at 0; the first thing on the way back."""
+        """Set to 0 the gradients to which several stages add; the backward pass of a step begins with it."""
         added = [*state.arrays, *self.pushed, *self.feet.foot]
-        if self.fluid.viscosity_moves:
-            added.append(self.medium.levels[0].mu)
+        if self.coefficients and self.fluid.viscosity_moves:
+            added.append(self.coefficients.levels[0].mu)
         alone(lambda: fill(0.0, *bars(added)))
 
     @property
     def mu_bar(self) -> wp.array:
-        """The gradient with respect to the painted viscosity, at centres, which every step adds to."""
-        return self.medium.painted_mu.grad if self.medium else self.diffusion.mu_bar
+        """The gradient with respect to the painted viscosity, at centres; every backward step adds to it."""
+        if isinstance(self.diffusion, SeparateDiffusion):
+            return self.diffusion.mu_bar
+        return self.diffusion.coefficients.painted_mu.grad
 
     def take_fluid(self, fluid: Fluid) -> None:
-        """Go on with a fluid that differs in the values of its viscosity, not in their kind."""
+        """Replace the fluid by one that differs in the values of its viscosity only, not in its type."""
         if fluid.viscosity is self.fluid.viscosity:
             return
         self.fluid = self.diffusion.fluid = fluid
-        if self.medium:
-            self.medium.fluid = fluid
-            self.medium.invalidate()
+        if self.coefficients:
+            self.coefficients.fluid = fluid
+            self.coefficients.invalidate()
 
     def helpers(self, alone: bool = False) -> ThreadTeam | None:
-        """The threads that share the launches of a step beside the calling one, where that gains.
+        """The threads that share the launches of a step with the calling one; None where that is no faster.
 
-        It gains earlier where the process is `alone`, has no other work to do meanwhile.
+        Smaller grids gain from it if the process is `alone`, that is, does no other work meanwhile.
         """
-        work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.medium else 1)
+        work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.coefficients else 1)
         least = SHARED_ALONE if alone else SHARED_CELLS
         shared = not self.device.is_cuda and free_cores() >= STEP_THREADS and work >= least
         return helpers(STEP_THREADS if shared else 1)
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
-        """Make ready for a step of dt that ends at t; the methods of its solves.
+        """Set the step up for a length dt and an end at t. Returns the methods of its solves.
 
-        `prepare` is called where what `follow_medium` computes is out of date.
+        Calls `prepare`, which must launch `update_coefficients`, if the coefficients have changed.
         """
         densities = tuple(density.plan(dt) for density in self.densities)
-        medium = self.medium
-        if not medium:
+        coefficients = self.coefficients
+        if not coefficients:
             return self.diffusion.plan(dt), self.projection.method, *densities
-        if medium.set_time(t, dt):
+        if coefficients.set_time(t, dt):
             try:
                 self._solves = self.diffusion.plan(dt), self.projection.plan(dt)
                 if not self.fluid.viscosity_moves:
                     prepare()
             except BaseException:
-                medium.invalidate()  # half done
+                coefficients.invalidate()  # half done
                 raise
         return *self._solves, *densities
 
-    def kept(self, dt: float, last_dt: float, swelled: bool) -> float:
-        """The part of the last step's pressure that a step of dt takes off before its diffusion.
+    def pressure_part(self, dt: float, last_dt: float, divergence_prescribed: bool) -> float:
+        """The fraction of the last step's pressure that a step of dt subtracts before its diffusion.
 
-        None where viscosity changes or moves: the strain that belonged to it would be elsewhere. Nor where
-        the last step `swelled`, prescribed divergence: its pressure was of that step alone.
+        It is 0 where viscosity changes or moves: that pressure belongs to the strain at the old places. It
+        is also 0 where the last step had `divergence_prescribed`, whose pressure acts in that step only.
         """
-        medium = self.medium
-        if not medium or medium.changes or self.fluid.viscosity_moves or last_dt == 0 or swelled:
+        coefficients = self.coefficients
+        if not coefficients or coefficients.changes or self.fluid.viscosity_moves:
+            return 0.0
+        if last_dt == 0 or divergence_prescribed:
             return 0.0
         return min(1.0, dt / last_dt)
 
     def expect(self, times: Sequence[float], dt: float) -> tuple:
-        """Make ready for steps of dt that end at these times, in a viscosity that depends on them.
+        """Set up steps of dt that end at these times, in a viscosity that depends on time.
 
-        Only the methods of the solves are known then: each step must take its viscosity, and `follow_medium`.
+        Returns the methods of their solves, which suit all of them. Before each step the caller must write
+        its viscosity to `coefficients.painted_mu` and call `update_coefficients`.
         """
-        self.medium.bound_over(times, dt)
-        return self.diffusion.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
+        coupled = self._coupled()
+        coupled.coefficients.bound_over(times, dt)
+        return coupled.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
 
-    def follow_medium(self, state: State | None = None) -> None:
-        """Medium, then solves: launches only. A viscosity that moves is taken along with `state`'s map."""
+    def update_coefficients(self, state: State | None = None) -> None:
+        """Update the coefficients on all grids, then the solvers: launches only.
+
+        With `state` the viscosity is first carried along with its map.
+        """
+        coupled = self._coupled()
         if state:
-            self.medium.carry(state)
-        self.medium.coarsen()
-        self.diffusion.prepare()
+            coupled.coefficients.carry(state)
+        coupled.coefficients.coarsen()
+        coupled.update_coefficients()
         if self.fluid.freeze:
-            self.projection.prepare()
+            self.projection.update_coefficients()
+
+    def _coupled(self) -> CoupledDiffusion:
+        """The diffusion of a fluid with coefficients.
+
+        Raises:
+            TypeError: one viscosity, and no drag, holds everywhere.
+        """
+        if not isinstance(self.diffusion, CoupledDiffusion):
+            raise TypeError("a fluid with one viscosity and no drag has no coefficients")
+        return self.diffusion
 
     def trace(self, state: State, forcing: Forcing) -> Vector:
-        """The feet of all centres [cells], with ghosts."""
+        """The feet (departure points) of all centres [cells], with ghosts."""
         return self.feet.trace((state.u, state.v), forcing)
 
     def carry_points(self, state_in: State, state_out: State, forcing: Forcing) -> None:
-        """The points a step later."""
+        """Move the state's points along the flow."""
         points, out = (state_in.p_x, state_in.p_y), (state_out.p_x, state_out.p_y)
         self.feet.carry_points(points, (state_in.u, state_in.v), forcing, out)
 
     def carry_map(self, state_in: State, foot: Vector, state_out: State) -> None:
-        """The displacement a step later."""
+        """Carry the state's map along the flow."""
         d, out = (state_in.d_x, state_in.d_y), (state_out.d_x, state_out.d_y)
         self.advection.carry_map(d, foot, out)
 
     def carry_densities(self, state_in: State, foot: Vector, forcing: Forcing, state_out: State) -> None:
-        """The densities a step later, with what their sources pour."""
+        """Carry, add to (by their sources) and diffuse the state's densities."""
         stages = zip(self.densities, state_in.rho, forcing.sources, state_out.rho, strict=True)
         for density, rho, sources, out in stages:
-            density.advance(rho, foot, self.where, sources, out)
+            density.advance(rho, foot, self.lookup_args, sources, out)
 
     def push(self, state: State, forcing: Forcing) -> Vector:
-        """The velocity after forces, with ghosts: the state's own where there are none."""
-        if not forcing.pushes:
+        """The velocity after forces, with ghosts: the state's own arrays if no force acts on it."""
+        if not forcing.adds_velocity:
             return state.u, state.v
         forcing.push(state, self.pushed)
         return self.pushed
@@ -255,9 +280,9 @@ class Step:
         return self.advection.carry_velocity(velocity, foot)
 
     def diffuse(self, velocity: Vector) -> Vector:
-        """The velocity after viscosity and drag, with ghosts; the same where there is neither."""
+        """The velocity after viscosity and drag, with ghosts: the same arrays if there is neither."""
         return self.diffusion.diffuse(velocity) if self.diffusion.method.iterations else velocity
 
     def project(self, velocity: Vector, out: Vector, forcing: Forcing | None = None) -> None:
-        """The velocity without its divergence but for what is prescribed, with ghosts."""
-        self.projection.project(velocity, out, forcing if forcing and forcing.swells else None)
+        """out = the projected velocity, with ghosts; its divergence is what `forcing` prescribes, or 0."""
+        self.projection.project(velocity, out, forcing if forcing and forcing.prescribes_divergence else None)

@@ -1,26 +1,26 @@
-"""Stages on a `wp.Tape`: each stage of a step records its own transpose, right where it launches.
+"""Stages on a `wp.Tape`: each stage of a step records its own transpose, next to its launches.
 
     with recording() as tape:
         step.advance(before, after, forcing)
     tape.backward()
 
-x_bar, the gradient of an objective with respect to the cells of x, is kept in `x.grad`. The transpose of a
-stage reads the gradients of what the stage wrote. To the gradients of what it read it adds:
+`x.grad` is x_bar, the gradient of an objective with respect to the cells of x. The transpose of a stage reads
+the gradients of the stage's outputs and computes those of its inputs:
 
-* Where several stages read an array (the state, the velocity after forces, the feet), its gradient is 0
-  when the tape begins to play (`Step.advance` records that last) and every reader adds its part.
-* From the advection to the projection each velocity has one reader, and so has a point: there the
-  transpose writes the gradient over. These velocities' gradients come with their ghosts filled.
+* An input that several stages read (the state, the velocity after forces, the feet): its gradient is 0 when
+  the tape begins to play (`Step.advance` records that last), and every transpose adds to it.
+* An input that one stage reads (the velocities from the advection to the projection, the points): the
+  transpose overwrites its gradient. For these velocities it also fills the gradient's ghosts.
 
-Ghosts are no unknowns. A transpose that scatters into the ghosts of a gradient folds them into the cells
-that they copy before it ends.
+Ghosts are no unknowns. A transpose that scatters into the ghosts of a gradient then folds them: it adds
+their values to the cells they copy.
 
-Every array is written by one stage. What a stage adds in place to an array that it has just written
-(forces to a velocity, sources to a density or to a divergence) is part of that stage, and linear: the
-transpose of y = x + s hands y_bar on to both x and s.
+Every array is written by one stage. A stage may add in place to an array that it has just written (forces to
+a velocity, sources to a density or to a divergence). That is linear and part of the stage: the transpose of
+y = x + s passes y_bar to both x and s.
 
-Without a tape nothing is recorded and nothing allocated. A stage's gradients, and what its transpose works
-with, are allocated by `allow_gradients`.
+Without a tape nothing is recorded or allocated. `allow_gradients` of a stage allocates its gradients and
+the scratch arrays of its transpose.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from contextvars import ContextVar
 
 import warp as wp
 
-from wfluid.fields.arrays import Vector, vector
+from wfluid.fields.arrays import Vector, field
 from wfluid.kernels.cell.layout import Layout
 
 _TAPE: ContextVar[wp.Tape | None] = ContextVar("tape", default=None)
@@ -40,7 +40,7 @@ _TAPE: ContextVar[wp.Tape | None] = ContextVar("tape", default=None)
 
 @contextmanager
 def recording() -> Iterator[wp.Tape]:
-    """A new tape, on which stages that launch within leave their transposes."""
+    """A new tape. Stages that launch within the block record their transposes on it."""
     tape = wp.Tape()
     token = _TAPE.set(tape)
     try:
@@ -50,9 +50,10 @@ def recording() -> Iterator[wp.Tape]:
 
 
 def record(backward: Callable[[], None], reads: Iterable[wp.array], writes: Iterable[wp.array]) -> None:
-    """Put the transpose of a stage that has just launched on the tape that is recording, if any.
+    """Put the transpose of a stage that has just launched on the tape, if one is recording.
 
-    Warp learns what the stage read and wrote (`wp.config.verify_autograd_array_access`).
+    `reads` and `writes` are the stage's arrays, which Warp checks for overwriting if
+    `wp.config.verify_autograd_array_access` is set.
 
     Raises:
         RuntimeError: an array has no gradient.
@@ -74,8 +75,8 @@ def bars(arrays: Sequence[wp.array]) -> Vector:
     return tuple(a.grad for a in arrays)
 
 
-def attach_gradients(arrays: Sequence[wp.array], layout: Layout) -> None:
+def attach_gradients(fields: Sequence[wp.array], layout: Layout, device: wp.Device) -> None:
     """Allocate the gradients of fields that have none yet."""
-    for a in arrays:
-        if a.grad is None:
-            (a.grad,) = vector(layout, a.device, 1)
+    for f in fields:
+        if f.grad is None:
+            f.grad = field(layout, device)
