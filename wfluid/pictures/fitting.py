@@ -9,7 +9,7 @@ import numpy as np
 
 from wfluid.pictures import color
 from wfluid.pictures.formats import CHANNELS as COUNTS
-from wfluid.pictures.formats import LINEAR, NUMPY, PROFILES, WINDOWS, WRITES, Encoding
+from wfluid.pictures.formats import LINEAR, NUMPY, POSITIVE, PROFILES, WINDOWS, WRITES, Encoding
 from wfluid.pictures.pairing import Window, cropped
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.profiles import Profile
@@ -34,8 +34,10 @@ class Fit:
     """The part of the picture that the file shows; None for all of it."""
     background: Color | None
     """Colour behind the picture where the file has no alpha, in linear light."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     """What the file does not hold, which a user should know."""
+    positive: bool = False
+    """Whether negative values become 0."""
 
 
 def fit(path: Path, picture: Picture, encoding: Encoding) -> Fit:
@@ -65,7 +67,7 @@ def fit(path: Path, picture: Picture, encoding: Encoding) -> Fit:
     if picture.data and not linear and picture.pixels.max() > 1:
         highest = f"{picture.pixels.max():.6g}"
         notes += (f"{path}: numbers up to {highest} are cut off at 1; .exr and .tif hold them as float",)
-    return Fit(dtype, channels, kept, profile, window, background, notes)
+    return Fit(dtype, channels, kept, profile, window, background, notes, ending in POSITIVE)
 
 
 def stored(picture: Picture, fit: Fit) -> np.ndarray:
@@ -81,6 +83,8 @@ def stored(picture: Picture, fit: Fit) -> np.ndarray:
         pixels = _over(pixels, picture.alpha, fit.channels, fit.background)
     else:
         pixels = _chosen(pixels, fit.channels)
+    if fit.positive:
+        pixels = np.maximum(pixels, 0.0)
     dtype, linear = NUMPY[fit.dtype], fit.dtype in LINEAR
     srgb = not linear and not picture.data
     if linear or fit.alpha is None:
@@ -103,7 +107,7 @@ def display_rgb(picture: Picture, background: Color | None = None) -> np.ndarray
     """
     channels, _ = _fitted(color_channels(picture), picture.alpha, (1, 3))
     behind = background if picture.alpha is not None and not picture.data else None
-    numbers = stored(picture, Fit("uint8", channels, None, None, display_window(picture), behind, ()))
+    numbers = stored(picture, Fit("uint8", channels, None, None, display_window(picture), behind))
     if numbers.shape[2] < 3:
         numbers = np.repeat(numbers, 3, axis=2)
     return np.ascontiguousarray(numbers)

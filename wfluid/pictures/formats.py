@@ -43,6 +43,9 @@ CHANNELS = {
 PROFILES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 """Formats that hold ICC profiles."""
 
+POSITIVE = (".hdr",)
+"""Formats of light that hold no negative values: RGBE has no sign."""
+
 WINDOWS = (".exr",)
 """Formats that hold a display window beside the data's."""
 

@@ -11,7 +11,7 @@ from wfluid.domain.checks import check_word
 from wfluid.domain.limits import COLORSPACES
 from wfluid.pictures import color
 from wfluid.pictures.fitting import Fit, display_window, fit, stored
-from wfluid.pictures.formats import LARGEST, LINEAR, QUALITIES, Encoding, PictureError, first_line
+from wfluid.pictures.formats import CHANNELS, LARGEST, LINEAR, QUALITIES, Encoding, PictureError, first_line
 from wfluid.pictures.picture import Picture, channels_beside
 from wfluid.pictures.reading import Stored, read_stored
 from wfluid.system.atomic import atomic_file
@@ -162,7 +162,7 @@ def _spec_for(picture: Picture, shape: tuple[int, ...], how: Fit, ending: str):
     spec.tile_width = spec.tile_height = spec.tile_depth = 0
     spec.nchannels = channels
     spec.channelformats = ()
-    kept = len(names) == channels and how.channels == tuple(range(channels))
+    kept = ending not in CHANNELS and len(names) == channels and how.channels == tuple(range(channels))
     spec.channelnames = names if kept else _names(channels, how.alpha)
     spec.alpha_channel = -1 if how.alpha is None else how.alpha
     spec.set_format(oiio.TypeDesc(how.dtype))
