@@ -1,6 +1,7 @@
 """What formats store, brought to one convention on reading."""
 
 import struct
+from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
@@ -73,6 +74,7 @@ def test_straight_alpha_is_known_in_every_format(tmp_path):
         check_straight(read_picture(tmp_path / f"a.{ending}"))
     bmp(tmp_path / "a.bmp", rgba())
     check_straight(read_picture(tmp_path / "a.bmp"))
+    check_straight(read_picture(Path(__file__).with_name("straight.jp2")))
 
 
 @pytest.mark.parametrize(("dtype", "top", "atol"), [("uint8", 255, 0.02), ("uint16", 65535, 1e-4)])
