@@ -1,6 +1,7 @@
 """What formats store, brought to one convention on reading."""
 
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -173,3 +174,17 @@ def test_the_first_frame_is_read_with_a_note(tmp_path):
     assert picture.pixels[0, 0, 0] == 1 and "first of several" in picture.notes[0]
     save(tmp_path / "b.gif", white)
     assert read_picture(tmp_path / "b.gif").notes == ()
+
+
+def test_an_animated_png_is_known_by_its_chunk(tmp_path):
+    save(tmp_path / "a.png", rgba())
+    assert read_picture(tmp_path / "a.png").notes == ()
+    still, control = (tmp_path / "a.png").read_bytes(), b"acTL" + struct.pack(">II", 2, 0)
+    chunk = struct.pack(">I", 8) + control + struct.pack(">I", zlib.crc32(control))
+    (tmp_path / "a.png").write_bytes(still[:33] + chunk + still[33:])  # after the header
+    assert "first of several" in read_picture(tmp_path / "a.png").notes[0]
+
+
+def test_a_targa_that_says_it_has_alpha_is_believed(tmp_path):
+    save(tmp_path / "a.tga", rgba((0, 0)), oiio__UnassociatedAlpha=1)
+    assert read_picture(tmp_path / "a.tga").alpha == 3

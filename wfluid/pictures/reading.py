@@ -33,6 +33,9 @@ PAGES = ("ico", "tiff")
 ONE = ("psd",)
 """Formats whose further pictures are parts of the first."""
 
+_ALPHA_OF_TARGA = 3
+"""Least attribute of a TGA's extension area that says that it has alpha (TGA 2.0, field 24)."""
+
 _WIDE = ("uint", "uint32", "int", "int32")
 """Names of integers of 32 bits."""
 
@@ -84,6 +87,8 @@ def read_stored(path: Path, colorspace: str) -> Stored:
         try:
             page = _page(source.format_name(), oiio.ImageInput.open(str(path)), notes)
             source.seek_subimage(page, 0)
+            if source.format_name() == "png" and _is_animated(path):
+                notes.append(_FIRST)
             spec = source.spec()
             _check(path, spec)
             dtype = _type_of(str(spec.format))
@@ -110,7 +115,8 @@ def read_stored(path: Path, colorspace: str) -> Stored:
         notes.append("it holds alpha alone, which is read as numbers, not as colours")
     integers = dtype not in LINEAR or str(spec.format) in _WIDE
     straight = kind in STRAIGHT or bool(spec.get_int_attribute("oiio:UnassociatedAlpha"))
-    if alpha is not None and kind in SPARE and not stored[..., alpha].any():
+    stated = spec.get_int_attribute("targa:alpha_type") >= _ALPHA_OF_TARGA
+    if alpha is not None and kind in SPARE and not stated and not stored[..., alpha].any():
         stored, alpha = np.delete(stored, alpha, axis=2), None
         notes.append("its alpha is 0 all over, so the picture is taken as opaque")
     colors = stored.shape[2] - (alpha is not None)
@@ -127,7 +133,7 @@ def _page(kind: str, probe: Any, notes: list[str]) -> int:
     if kind in ONE or probe is None or not probe.seek_subimage(1, 0):
         return 0
     if kind not in PAGES:
-        notes.append("the first of several pictures in the file is read, without the others")
+        notes.append(_FIRST)
         return 0
     sizes = []
     while probe.seek_subimage(len(sizes), 0):
@@ -136,6 +142,15 @@ def _page(kind: str, probe: Any, notes: list[str]) -> int:
     width, height = sizes[page]
     notes.append(f"picture {page + 1} of {len(sizes)} in it, {width} x {height} pixels, is read: the largest")
     return page
+
+
+_FIRST = "the first of several pictures in the file is read, without the others"
+
+
+def _is_animated(png: Path) -> bool:
+    """Whether a PNG has a chunk of animation, which is before its first picture (PNG 3, section 11.3.6.1)."""
+    with png.open("rb") as file:
+        return b"acTL" in file.read(1 << 16).partition(b"IDAT")[0]
 
 
 def _check(path: Path, spec: Any) -> None:
