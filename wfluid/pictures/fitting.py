@@ -52,9 +52,9 @@ def fit(path: Path, picture: Picture, encoding: Encoding) -> Fit:
     dtype = encoding.type or own
     linear = dtype in LINEAR
     alpha = picture.alpha
+    channels: tuple[int | None, ...]
     if ending not in COUNTS:
-        channels = tuple(range(picture.pixels.shape[2]))
-        kept = alpha
+        channels, kept = tuple(range(picture.pixels.shape[2])), alpha
     else:
         channels, kept = _fitted(color_channels(picture), alpha, COUNTS[ending])
     profile = picture.profile
@@ -79,7 +79,7 @@ def stored(picture: Picture, fit: Fit) -> np.ndarray:
     if fit.window is not None:
         picture = cropped(picture, fit.window)
     pixels = picture.pixels
-    if fit.background is not None:
+    if fit.background is not None and picture.alpha is not None:
         pixels = _over(pixels, picture.alpha, fit.channels, fit.background)
     else:
         pixels = _chosen(pixels, fit.channels)
@@ -92,9 +92,7 @@ def stored(picture: Picture, fit: Fit) -> np.ndarray:
     else:
         opacity = pixels[..., [fit.alpha]]
         straight = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
-        colors = [n for n in range(pixels.shape[2]) if n != fit.alpha]
-        numbers = np.empty(pixels.shape, dtype)
-        numbers[..., colors] = _encoded(straight[..., colors], dtype, srgb, fit.profile)
+        numbers = _encoded(straight, dtype, srgb, fit.profile, fit.alpha)
     if fit.alpha is not None:
         numbers[..., fit.alpha] = color.encode(pixels[..., fit.alpha], dtype, srgb=False)
     return numbers
@@ -202,10 +200,16 @@ def _over(pixels: np.ndarray, alpha: int, channels: tuple[int | None, ...], back
     return _chosen(pixels, channels) + (1 - opacity) * behind
 
 
-def _encoded(linear: np.ndarray, dtype: str, srgb: bool, profile: Profile | None) -> np.ndarray:
+def _encoded(
+    linear: np.ndarray, dtype: str, srgb: bool, profile: Profile | None, alpha: int | None = None
+) -> np.ndarray:
+    """Colours as numbers of a file; those in the place of alpha mean nothing."""
     if profile is None:
         return color.encode(linear, dtype, srgb=srgb)
-    return color.encode(profile.encode(linear), dtype, srgb=False)
+    colors = [n for n in range(linear.shape[2]) if n != alpha]
+    numbers = np.empty(linear.shape, dtype)
+    numbers[..., colors] = color.encode(profile.encode(linear[..., colors]), dtype, srgb=False)
+    return numbers
 
 
 def _notes(

@@ -51,7 +51,7 @@ class Curve:
         """Light of stored values."""
         x = np.abs(np.asarray(stored, dtype=np.float64))
         if self.table is not None:
-            light = np.interp(x, self._places, self.table)
+            light = np.interp(x, _places(self.table), self.table)
         else:
             power = np.maximum(self.a * x + self.b, 0.0) ** self.gamma + self.e
             light = np.where(x >= self.d, power, self.c * x + self.f)
@@ -61,17 +61,18 @@ class Curve:
         """The inverse of `decode`."""
         y = np.abs(np.asarray(light, dtype=np.float64))
         if self.table is not None:
-            stored = np.interp(y, self.table, self._places)
+            stored = np.interp(y, self.table, _places(self.table))
         else:
             stored = (np.maximum(y - self.e, 0.0) ** (1 / self.gamma) - self.b) / self.a
             if self.d > 0:
                 below = (y - self.f) / self.c if self.c else np.zeros_like(y)
-                stored = np.where(y >= self.decode(np.float64(self.d)), stored, below)
+                stored = np.where(y >= self.decode(np.array(self.d)), stored, below)
         return np.copysign(np.maximum(stored, 0.0), light)
 
-    @property
-    def _places(self) -> np.ndarray:
-        return np.linspace(0.0, 1.0, len(self.table))
+
+def _places(table: np.ndarray) -> np.ndarray:
+    """The stored values of a table's entries."""
+    return np.linspace(0.0, 1.0, len(table))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,12 +156,12 @@ def _curve(tag: bytes) -> Curve:
         (count,) = struct.unpack_from(">I", tag, 8)
         if count == 0:
             return Curve()
-        values = np.frombuffer(tag, ">u2", count=count, offset=12) if 12 + 2 * count <= len(tag) else []
-        if len(values) != count:
+        if 12 + 2 * count > len(tag):
             raise ValueError("is malformed")
+        values = np.frombuffer(tag, ">u2", count=count, offset=12).astype(np.float64)
         if count == 1:
-            return _checked(Curve(gamma=values[0] / 256))
-        table = values / 65535
+            return _checked(Curve(gamma=float(values[0]) / 256))
+        table: np.ndarray = values / 65535
         if table[-1] <= table[0] or np.any(np.diff(table) < 0):
             raise ValueError("has a curve that does not increase")
         return Curve(table=table)

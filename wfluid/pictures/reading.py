@@ -135,7 +135,7 @@ def _page(kind: str, probe: Any, notes: list[str]) -> int:
     if kind not in PAGES:
         notes.append(_FIRST)
         return 0
-    sizes = []
+    sizes: list[tuple[int, int]] = []
     while probe.seek_subimage(len(sizes), 0):
         sizes.append((probe.spec().width, probe.spec().height))
     page = max(range(len(sizes)), key=lambda n: sizes[n][0] * sizes[n][1])
