@@ -63,7 +63,7 @@ def runs(draw):
 
 
 @given(runs(), st.data())
-def test_every_state_is_there_when_it_is_needed_and_rooms_are_counted_truly(run, data):
+def test_schedules_have_every_state_they_need_and_store_as_many_as_they_say(run, data):
     steps, breaks = run
     room = data.draw(st.integers(least_room(steps, breaks), steps + 3))
     schedule = even_segments(steps, room, breaks)
@@ -84,7 +84,7 @@ def test_no_step_is_taken_more_than_twice_and_those_of_the_last_segment_once(run
 
 
 @given(runs(), st.data())
-def test_segments_follow_on_one_another_and_end_at_every_break(run, data):
+def test_segments_are_contiguous_and_end_at_every_break(run, data):
     steps, breaks = run
     schedule = even_segments(steps, data.draw(st.integers(least_room(steps, breaks), steps + 3)), breaks)
     ends = [schedule.segments[0][0], *(end for _, end in schedule.segments)]
@@ -115,7 +115,7 @@ def rooms_of_every_cut(steps, breaks):
 
 @pytest.mark.parametrize("breaks", [(), (3,), (2, 3), (1, 5, 9), (0, 7), (11,)], ids=str)
 @pytest.mark.parametrize("steps", [1, 2, 3, 5, 8, 11])
-def test_the_least_room_is_that_of_the_best_of_all_cuts(steps, breaks):
+def test_the_least_room_is_the_minimum_over_all_segmentations(steps, breaks):
     breaks = {step for step in breaks if step <= steps}
     least = min(rooms_of_every_cut(steps, breaks))
     assert least_room(steps, breaks) == least
@@ -125,7 +125,7 @@ def test_the_least_room_is_that_of_the_best_of_all_cuts(steps, breaks):
 
 
 @given(runs())
-def test_room_for_all_states_keeps_them_and_takes_every_step_once(run):
+def test_with_room_for_all_states_every_step_is_taken_once(run):
     steps, breaks = run
     every = even_segments(steps, breaks=breaks)
     assert every.keeps_all and every.room == steps + 1
@@ -134,7 +134,7 @@ def test_room_for_all_states_keeps_them_and_takes_every_step_once(run):
 
 
 @given(runs(), st.data())
-def test_no_longer_segments_would_have_had_room(run, data):
+def test_segments_are_the_longest_that_fit(run, data):
     """Of all lengths the longest that fits is taken: every longer one needs more room than there is."""
     steps, breaks = run
     least = least_room(steps, breaks)
@@ -153,12 +153,12 @@ def test_no_longer_segments_would_have_had_room(run, data):
 
 
 @pytest.mark.parametrize("steps", [4, 10, 100, 1000, 9999])
-def test_about_twice_the_root_of_the_steps_is_room_enough(steps):
+def test_room_for_twice_the_root_of_the_steps_suffices(steps):
     """Segments of sqrt(n) steps take sqrt(n) + 1 rooms and sqrt(n) stores; rounding up adds one to either."""
     assert least_room(steps) <= 2 * steps**0.5 + 3
 
 
-def test_the_rooms_of_a_schedule_by_hand():
+def test_rooms_equal_those_counted_by_hand():
     """Seven steps, cut at 3 and 5: four states of the longest segment, and three stored."""
     schedule = Schedule(((0, 3), (3, 5), (5, 7)), keeps_all=False)
     assert schedule.room == 4 + 3

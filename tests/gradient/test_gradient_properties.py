@@ -179,7 +179,7 @@ def test_a_force_outside_its_window_has_no_gradient(device):
     [FREE_SLIP, NO_SLIP, MOVES, DENSITIES, CHANGES],
     ids=["constant", "painted", "moves", "ink", "changes"],
 )
-def test_no_cap_on_memory_changes_a_bit(device, case):
+def test_memory_caps_do_not_change_a_bit(device, case):
     """Nor does it with segments that do not divide the 23 steps; and the states keep below the cap."""
     case = loosely(case)
     whole = case.functional(device, timeline=LONGER)
@@ -202,7 +202,7 @@ LONGER = Timeline(23 / 48, fps=48, substeps=1)
 
 @pytest.mark.parametrize("case", [FREE_SLIP, NO_SLIP, DENSITIES], ids=["constant", "painted", "ink"])
 @pytest.mark.parametrize("steps", [7, 30, 101])
-def test_memory_is_what_the_schedule_says(device, case, steps):
+def test_memory_is_the_states_of_the_schedule(device, case, steps):
     """So many rooms, and those of the states and gradients that a step works with."""
     timeline = Timeline(steps / 48, fps=48, substeps=1)
     case = loosely(case, objective=ParticleMisfit(PARTICLES.points, PARTICLES.destinations, steps / 48))
@@ -256,7 +256,7 @@ SOLVES = {
 
 @pytest.mark.float64
 @pytest.mark.parametrize("name", SOLVES)
-def test_a_replay_follows_a_viscosity_that_asks_for_other_solves(device, name):
+def test_a_viscosity_that_needs_another_solve_is_captured_again(device, name):
     """More sweeps or cycles, or conjugate gradients: recorded anew, and the old ones still there."""
     viscosity, settings, times = SOLVES[name]
     fluid = {"viscosity": viscosity, "diffusion_tolerance": 1e-5, **settings}
@@ -361,7 +361,7 @@ def watched(device, monkeypatch):
 @pytest.mark.float64
 @pytest.mark.parametrize("capped", [False, True], ids=["", "capped"])
 @pytest.mark.parametrize("case", [FREE_SLIP, MOVES, DENSITIES], ids=["constant", "moves", "ink"])
-def test_no_array_is_written_that_the_way_back_still_reads(device, watched, case, capped):
+def test_no_array_is_overwritten_that_the_backward_pass_reads(device, watched, case, capped):
     def evaluate():
         functional = loosely(case).functional(device, memory_mb=least_mb if capped else None)
         functional.value_and_gradient(functional.start)
@@ -372,7 +372,7 @@ def test_no_array_is_written_that_the_way_back_still_reads(device, watched, case
 
 
 @pytest.mark.float64
-def test_a_recording_that_steps_to_and_fro_between_two_states_is_warned_of(device, watched):
+def test_a_tape_over_steps_that_alternate_between_two_states_warns(device, watched):
     """What the last test would see: the second step writes the state that the first read."""
     a, b = (State.at_rest(GRID, device, points=1) for _ in range(2))
     for state in (a, b):

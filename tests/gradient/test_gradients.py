@@ -93,7 +93,7 @@ def test_the_remainder_falls_with_the_square_of_the_step(device, name):
     assert remainders.rejected <= REJECTED * remainders.steps, remainders.rejected
 
 
-def test_the_cases_are_of_every_kind():
+def test_the_cases_cover_every_kind():
     """Every number that may vary does so in some case; every objective, wall and kind of fluid is there."""
     varying, known, asked, walls, fluids = set(), set(), set(), [set(), set()], []
     for case in CASES.values():
@@ -120,7 +120,7 @@ def test_the_cases_are_of_every_kind():
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if "paper" in name])
-def test_traces_that_come_to_lie_in_other_cells_are_seen(device, name):
+def test_feet_that_move_to_other_cells_are_noticed(device, name):
     """What the rejection of steps relies on: the same run lies in the same cells, one that is far off not."""
     functional = CASES[name].functional(device)
     remainders, noise = Remainders(functional), np.random.default_rng(0)

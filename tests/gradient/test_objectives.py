@@ -100,7 +100,7 @@ def halved(total: wp.array[Real], value: wp.array[Real]):
     wp.atomic_add(value, 0, Real(0.5) * total[0] * total[0])
 
 
-def test_what_a_warp_objective_keeps_between_its_kernels_does_not_pile_up(make, device):
+def test_intermediate_gradients_of_a_warp_objective_do_not_accumulate(make, device):
     """The same numbers give the same gradient, however often they are asked for."""
     total = wp.zeros(1, dtype=Real, device=device, requires_grad=True)
 
@@ -122,7 +122,7 @@ def test_a_warp_objective_that_launches_nothing_is_refused(make):
 
 
 @pytest.mark.parametrize("interrupted", ["record_forward", "record_backward"])
-def test_an_interrupted_capture_is_made_up_for(make, monkeypatch, interrupted):
+def test_an_interrupted_capture_is_repeated(make, monkeypatch, interrupted):
     """A stiffer fluid asks for other solves; interrupted there, the next evaluation captures them anew."""
     fluid = Fluid(viscosity=0.01, diffusion_tolerance=1e-4)
     functional = make(MISFIT, fluid, ["fluid.viscosity"])
@@ -142,7 +142,7 @@ def test_an_interrupted_capture_is_made_up_for(make, monkeypatch, interrupted):
     np.testing.assert_array_equal(found[1], gradient)
 
 
-def test_where_something_is_frozen_solves_go_to_a_tolerance_that_gradients_can_rely_on(make):
+def test_with_frozen_parts_the_tolerance_of_solves_is_lowered_for_gradients(make):
     """Conjugate gradients are their own transpose only as far as they go: here to 1e-4 at least."""
     freeze = Freeze((np.arange(17) > 11)[None, :] * np.ones((12, 1)))
     functional = make(MISFIT, Fluid(viscosity=0.01, freeze=freeze))

@@ -239,7 +239,7 @@ coordinates below 128 is 1.5 (2 eps + 128 eps slope) / STEP, below 2e-10 for slo
 @pytest.mark.parametrize("filter", FILTERS)
 @pytest.mark.parametrize("edge", EDGES)
 @pytest.mark.parametrize("channels", [3, 7])
-def test_the_slope_of_what_a_pixel_shows_is_that_of_its_differences(device, filter, edge, channels):
+def test_the_slope_of_a_look_up_equals_differences(device, filter, edge, channels):
     """Anywhere in the picture and up to three times its size outside, where nothing has a kink nearby."""
     picture, grid, random = noise(30, 20, channels), Grid(8, 6), np.random.default_rng(3)
     look_up = LookUp(picture, grid, Walls(), device, width=75, height=60, filter=filter, edge=edge)
@@ -275,7 +275,7 @@ def test_the_slope_of_what_a_pixel_shows_is_that_of_its_differences(device, filt
 
 @pytest.mark.float64
 @pytest.mark.parametrize("filter", FILTERS)
-def test_a_place_too_far_to_be_told_has_no_slope(device, filter):
+def test_a_place_too_far_away_has_no_slope(device, filter):
     """Where the look-up stops the coordinate, on every side; finite too, where it is not a number."""
     look_up = LookUp(noise(30, 20), Grid(8, 6), Walls(), device, filter=filter, edge="wrap")
     adjoint = LookUpAdjoint(look_up)
@@ -399,7 +399,7 @@ GOOD = SimpleNamespace(picture=smooth(8, 6), target=smooth(5, 7))
         ({"picture": Picture(np.full((5, 7, 3), np.inf))}, "PictureMisfit.picture: a pixel is not finite"),
     ],
 )
-def test_what_cannot_be_compared_is_refused_in_one_line(wrong, message):
+def test_pictures_that_cannot_be_compared_are_refused_in_one_line(wrong, message):
     with pytest.raises(ValueError, match=re.escape(message)) as error:
         PictureMisfit(**(vars(GOOD) | {"time": 1.0} | wrong))
     assert "\n" not in str(error.value)

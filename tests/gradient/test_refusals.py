@@ -58,11 +58,11 @@ def test_a_run_that_is_in_order_is_not_refused(make):
 
 
 @pytest.mark.parametrize("time", [0.0, -0.1, 0.126, 7.0, math.nan, math.inf])
-def test_an_objective_outside_the_run_is_told_when_the_run_ends(make, time):
+def test_an_objective_outside_the_run_is_refused_with_the_end_of_the_run(make, time):
     refuses(f"an objective at {time:g} s: expected a time after 0 and up to 0.125 s", make, at(time))
 
 
-def test_an_objective_between_steps_is_told_the_steps_beside_it(make):
+def test_an_objective_between_steps_is_refused_with_the_nearest_steps(make):
     for time in (0.05, 0.001):
         step = int(time * 48)
         beside = f"between steps, at {step / 48:.6g} s and {(step + 1) / 48:.6g} s"
@@ -95,7 +95,7 @@ NAMES = [
 @pytest.mark.parametrize(
     "name", ["force[0].vector", "forces[2].vector", "forces[0].spin", "forces", "fluid.sweeps", "", "[*]"]
 )
-def test_an_unknown_name_is_told_all_there_are(make, name):
+def test_an_unknown_name_is_refused_with_all_names(make, name):
     forces = [GaussianForce((0.4, 0.4), (1.0, 0.5), 0.1), VortexForce((0.6, 0.2), 3.0, 0.1)]
     ink = Density(sources=[Source((0.5, 0.2), 1.0, 0.1), PaintedSource(Painted(np.eye(3)))])
     message = refuses(
@@ -111,7 +111,7 @@ def test_a_name_twice_is_refused(make):
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf])
-def test_a_scale_that_is_none_is_refused(scale):
+def test_a_scale_that_is_not_positive_is_refused(scale):
     refuses("scale of velocity", Free, "velocity", scale)
 
 
@@ -128,7 +128,7 @@ def test_memory_too_small_names_the_least_that_works(make):
     refuses(f"need at least {least:g}", make, memory_mb=least - 0.01)
 
 
-def test_memory_with_objectives_of_the_fluid_on_the_way_names_the_least_too(make):
+def test_memory_too_small_for_objectives_during_the_run_names_the_least_that_works(make):
     """Objectives that look at the fluid cut the run into segments: two more rooms for stored states."""
     objective = MapMisfit(np.zeros((2, 10, 13)), 1 / 48) + MapMisfit(np.zeros((2, 10, 13)), 5 / 48)
     refused = refuses("need at least ", make, objective, memory_mb=0.01)
@@ -164,7 +164,7 @@ def test_controls_that_a_force_refuses_are_refused_and_the_next_are_not(make):
 PAINT = np.linspace(0.01, 0.03, 130).reshape(10, 13)
 
 
-def test_a_free_viscosity_asks_for_a_diffusion_solved_to_a_tolerance(make):
+def test_a_free_viscosity_needs_a_diffusion_solved_to_a_tolerance(make):
     free = ["fluid.viscosity"]
     for viscosity in (0.01, PAINT):
         settings = {"viscosity": viscosity}
@@ -176,14 +176,14 @@ def test_a_free_viscosity_asks_for_a_diffusion_solved_to_a_tolerance(make):
         make(fluid={"solver": "jacobi", **settings})
 
 
-def test_a_viscosity_that_moves_asks_for_the_same(make):
+def test_a_viscosity_that_moves_needs_the_same_tolerance(make):
     moves = {"viscosity": PAINT, "viscosity_moves": True}
     refuses("set diffusion_tolerance to 0.0001 or less, not 0.007", make, fluid=moves)
     refuses("a viscosity that moves needs", make, fluid={"solver": "jacobi", **moves})
     make(fluid={**SURE, **moves})
 
 
-def test_a_free_viscosity_of_zero_is_refused_for_its_logarithm_varies(make):
+def test_a_free_viscosity_of_zero_is_refused(make):
     holes = np.where(PAINT > 0.02, PAINT, 0.0)
     for viscosity in (0.0, holes):
         fluid = {"viscosity": viscosity, **SURE}
@@ -217,7 +217,7 @@ def test_particles_outside_the_picture_are_refused(make, point):
 
 
 @pytest.mark.parametrize("points", [[(math.nan, 0.3)], [(0.4, math.inf)]], ids=str)
-def test_particles_that_are_nowhere_are_refused(points):
+def test_particles_at_positions_not_finite_are_refused(points):
     refuses("points: a number is not finite", ParticleMisfit, points, POINT, 0.125)
     refuses("points: a number is not finite", ParticleFunction, points, print, [0.125])
 
@@ -263,7 +263,7 @@ def test_a_gradient_of_another_shape_than_the_particles_is_refused(make):
 @pytest.mark.parametrize(
     "objective", [at(0.125), MapMisfit(np.zeros((2, 10, 13)), 0.125)], ids=["particle", "map"]
 )
-def test_a_fluid_that_overflows_is_told_from_which_step_on(make, objective):
+def test_overflow_is_reported_with_its_first_step(make, objective):
     """Walls stop a particle and a foot wherever they go, so the objective alone would not tell."""
     functional = make(objective, ["velocity"])
     assert np.isfinite(functional.value(functional.start))
@@ -277,7 +277,7 @@ def test_a_fluid_that_overflows_is_told_from_which_step_on(make, objective):
 
 @pytest.mark.filterwarnings("ignore:overflow encountered in cast")
 @pytest.mark.parametrize("memory_mb", [None, 0.0])
-def test_a_fluid_that_overflows_on_the_way_is_told_where(make, memory_mb):
+def test_overflow_of_a_density_is_reported_with_its_first_step(make, memory_mb):
     """A density that a source raises beyond what single precision holds, in the fourth step."""
     late = Source((0.5, 0.3), 1e6, 0.1, envelope=Late())
     ink = Density(sources=[late])
@@ -319,7 +319,7 @@ def test_an_objective_that_is_not_finite_although_the_fluid_is_says_so(make):
 
 @pytest.mark.parametrize("step", [1, 4, 6])
 @pytest.mark.parametrize("capped", [False, True])
-def test_a_gradient_that_is_not_finite_says_from_which_step_backward(make, step, capped):
+def test_a_gradient_that_is_not_finite_is_reported_with_its_step(make, step, capped):
     """A function of particles whose gradient is none: going back, the step to its time is the first."""
     wrong = ParticleFunction(POINT, lambda t, x: (1.0, np.full_like(x, math.nan)), [step / 48])
     memory_mb = None

@@ -75,7 +75,7 @@ def cut(make, fluid, forces, **more):
 @pytest.mark.parametrize(
     ("name", "early"), [*((name, PUSH) for name in FLUIDS), ("no-slip", GROWING), ("drag", GROWING)]
 )
-def test_a_run_that_goes_on_from_a_cut_ends_as_the_whole_does(make, name, early):
+def test_a_run_continued_from_a_state_ends_as_the_complete_run(make, name, early):
     """Velocity, map, pressure, densities to the bit; particles too, but for their places' change of unit."""
     fluid, forces = FLUIDS[name], [PUSH, early, *LATE]
     whole = make(fluid, ParticleMisfit(POINTS, WANTED, END), forces)
@@ -89,7 +89,7 @@ def test_a_run_that_goes_on_from_a_cut_ends_as_the_whole_does(make, name, early)
     assert np.abs(expected.velocity[0]).max() > 0.05
 
 
-def test_a_viscosity_that_changes_goes_on_at_its_own_time(make):
+def test_a_continued_run_uses_the_viscosity_at_its_time(make):
     """Its cycles are planned for the whole of a run: halves are solved otherwise, as well as was asked."""
     keys = {0.0: paint(0.002, 0.03, 19), 0.1: 0.02, 0.2: paint(0.02, 0.3, 20)}
     fluid = {"viscosity": Keyed(keys), "diffusion_tolerance": 1e-6, "pressure_cycles": 5}
@@ -101,7 +101,7 @@ def test_a_viscosity_that_changes_goes_on_at_its_own_time(make):
         np.testing.assert_allclose(got, wanted, rtol=0, atol=2e-5 * np.abs(wanted).max())
 
 
-def test_a_state_may_be_gone_on_from_time_and_again(make):
+def test_a_state_can_be_continued_from_more_than_once(make):
     """A run does not change the state it begins with; ten runs of a step each are one of ten steps."""
     fluid, forces = FLUIDS["viscosity that moves"], [PUSH, TWIRL]
     whole = make(fluid, MAP, forces)
@@ -121,7 +121,7 @@ def test_a_state_may_be_gone_on_from_time_and_again(make):
 
 @pytest.mark.parametrize("capped", [False, True])
 @pytest.mark.parametrize("name", ["constant viscosity", "densities", "viscosity that moves"])
-def test_the_second_half_has_the_gradient_of_the_whole(make, name, capped):
+def test_the_second_half_has_the_gradient_of_the_complete_run(make, name, capped):
     """With respect to forces that act in it only; whatever the memory that it has."""
     fluid, forces = FLUIDS[name], [*LATE, PUSH, BRIEF_GROWTH]
     free = [Free(f"forces[{n}].{key}") for n in (0, 1) for key in ("vector", "center", "radius")]
@@ -144,7 +144,7 @@ def test_the_second_half_has_the_gradient_of_the_whole(make, name, capped):
     assert np.all(expected != 0)
 
 
-def test_the_efforts_of_the_halves_add_to_that_of_the_whole(make):
+def test_the_efforts_of_the_halves_add_to_that_of_the_complete_run(make):
     fluid, forces = FLUIDS["constant viscosity"], [PUSH, *LATE]
     whole, first = make(fluid, Effort(), forces), make(fluid, Effort(), forces, end=MIDDLE)
     second = make(fluid, Effort(), forces, begin=(MIDDLE, cut(make, fluid, forces)))
@@ -153,7 +153,7 @@ def test_the_efforts_of_the_halves_add_to_that_of_the_whole(make):
     assert min(parts) > 0
 
 
-def test_a_half_is_looked_at_at_the_times_of_the_whole(make):
+def test_objectives_of_a_half_have_the_times_of_the_complete_run(make):
     """Particles and maps at a time between two others, whatever step of its own run that is."""
     fluid, forces = FLUIDS["constant viscosity"], [PUSH, *LATE]
     middle, between = cut(make, fluid, forces), MIDDLE + 2 / 48
@@ -168,7 +168,7 @@ def test_a_half_is_looked_at_at_the_times_of_the_whole(make):
     assert values(POINTS, end=between) == whole
 
 
-def test_a_state_given_out_stays_as_it_is_when_the_run_is_done_again(make):
+def test_a_returned_state_does_not_change_when_the_run_is_repeated(make):
     functional = make(FLUIDS["constant viscosity"], MAP, [PUSH])
     state = functional.state_after(functional.start)
     kept = fields(state)
@@ -178,7 +178,7 @@ def test_a_state_given_out_stays_as_it_is_when_the_run_is_done_again(make):
 
 
 @pytest.mark.parametrize("size", [(600, 400), (480, 320), (400, 600)])
-def test_a_point_on_an_edge_may_be_gone_on_from(device, size):
+def test_a_run_can_be_continued_with_a_point_on_an_edge(device, size):
     """Single precision may leave it outside by its rounding."""
     grid, fluid = Grid.for_picture(*size, 48), Fluid(viscosity=0.01)
     points = [(0.5 * grid.width, grid.height), (grid.width, 0.4 * grid.height)]
@@ -247,7 +247,7 @@ def test_a_functional_with_the_graphs_of_another_computes_the_same(device, name,
     ],
     ids=lambda change: ", ".join(change),
 )
-def test_graphs_that_do_not_suit_are_not_taken_over(device, change):
+def test_graphs_that_do_not_fit_are_not_reused(device, change):
     change = dict(change)
     usual = {
         "grid": GRID,
@@ -269,7 +269,7 @@ def test_graphs_that_do_not_suit_are_not_taken_over(device, change):
     first.value(first.start)  # still has its graphs
 
 
-def test_a_functional_whose_graphs_were_taken_over_refuses_to_run(device):
+def test_a_functional_whose_graphs_another_reuses_refuses_to_run(device):
     """Its tables hold another's run: it would return another's value."""
     graphs, objective = GraphCache(), ParticleMisfit(POINTS, WANTED, END)
     fluid = Fluid(viscosity=0.01)
@@ -297,7 +297,7 @@ def refuses(message, build, *arguments, **more):
     assert "\n" not in str(caught.value)
 
 
-def test_parts_that_are_none_of_the_run_are_refused(make):
+def test_a_beginning_that_does_not_fit_the_run_is_refused(make):
     fluid, forces = FLUIDS["constant viscosity"], [PUSH]
     middle = cut(make, fluid, forces)
     says = "a run begins with a velocity or with a state, not with both"

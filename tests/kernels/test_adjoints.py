@@ -377,7 +377,7 @@ def test_what_is_carried_from_fixed_feet_is_scattered_back(device, scheme, walls
 
     def scatter_back(before, bar, ghosts):
         out = field(LAYOUT, device)
-        advection_adjoint.place_feet.launch(LAYOUT, device, [*foot, before, *step.where], place)
+        advection_adjoint.place_feet.launch(LAYOUT, device, [*foot, before, *step.lookup_args], place)
         scattered.launch(LAYOUT, device, [*place, bar, LAYOUT.nx, pitch], [out], turn=0)
         ghosts.fold(out)
         return out
@@ -385,11 +385,11 @@ def test_what_is_carried_from_fixed_feet_is_scattered_back(device, scheme, walls
     for before, ghosts, seed in zip((1, pitch), step.velocity_ghosts, (1, 2), strict=True):
         (x,), (y,) = noise(LAYOUT, device, 1, seed, ghosts), noise(LAYOUT, device, 1, seed + 8, ghosts)
         out = field(LAYOUT, device)
-        advect.launch(LAYOUT, device, [x, *foot, before, *step.where], [out])
+        advect.launch(LAYOUT, device, [x, *foot, before, *step.lookup_args], [out])
         assert_transposed([y], [out], [scatter_back(before, y, ghosts)], [x])
     x = noise(LAYOUT, device, 2, 4, *step.moved_ghosts)
     y, out = noise(LAYOUT, device, 2, 5), vector(LAYOUT, device, 2)
-    carry.launch(LAYOUT, device, [*x, *foot, *step.where], out)
+    carry.launch(LAYOUT, device, [*x, *foot, *step.lookup_args], out)
     for f, to in zip(foot, out, strict=True):
         from_numpy(to_numpy(to, LAYOUT) - to_numpy(f, LAYOUT), to, LAYOUT)
     back = [scatter_back(0, bar, ghosts) for bar, ghosts in zip(y, step.moved_ghosts, strict=True)]
@@ -421,12 +421,12 @@ def test_a_densitys_transport_is_transposed(device, walls, limited):
         from_numpy(values, f, LAYOUT)
         ghosts.fill(f)
         out = field(LAYOUT, device)
-        transport.carry_density.launch(LAYOUT, device, [f, *step.feet.foot, *step.where], [out])
+        transport.carry_density.launch(LAYOUT, device, [f, *step.feet.foot, *step.lookup_args], [out])
         outs.append(to_numpy(out, LAYOUT))
     ax = (outs[1] - outs[0]) / small
     (y,) = noise(LAYOUT, device, 1, 2)
     foot_bar = vector(LAYOUT, device, 2)
-    inputs = [rho, *step.feet.foot, y, *step.where]
+    inputs = [rho, *step.feet.foot, y, *step.lookup_args]
     transport_adjoint.carry_density_adjoint.launch(LAYOUT, device, inputs, [rho_bar, *foot_bar], turn=0)
     ghosts.fold(rho_bar)
     at = [np.count_nonzero(to_numpy(f, LAYOUT) == 0) for f in foot_bar]

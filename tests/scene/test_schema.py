@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from scenes import KEYS, VALUES, WRONG, changed, full, keys_of, less, named, of_morph, parts, scenes, takes
+from scenes import KEYS, VALUES, WRONG, changed, full, less, named, of_morph, scenes, takes
 
 from wfluid.domain.limits import CURVES
-from wfluid.scene.checking import checked
+from wfluid.scene.checking import checked, keys_of, parts
 from wfluid.scene.format import SCENE
 from wfluid.scene.reference import reference, tables
 from wfluid.scene.scene import Scene

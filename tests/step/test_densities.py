@@ -57,7 +57,7 @@ def test_diffusion_conserves_mass_to_rounding_in_double(make_solver, kappa):
     assert state.densities[0].sum() == pytest.approx(values.sum(), rel=1e-13)
 
 
-def test_a_blob_spreads_as_the_root_of_twice_kappa_t(make_solver):
+def test_a_gaussian_spreads_as_the_root_of_two_kappa_t(make_solver):
     """Its variance along either axis grows by 2 kappa t, exactly so for central differences and any dt."""
     grid, kappa = Grid(96, 96, 1.0, 1.0), 2e-3
     start = blob(grid, (0.5, 0.45), 0.04)
@@ -92,7 +92,7 @@ def test_transport_has_the_order_of_its_interpolation(make_solver):
     assert np.all(orders > 1.9), (errors, orders)
 
 
-def test_a_density_never_leaves_its_range(make_solver):
+def test_advection_keeps_a_density_within_its_initial_range(make_solver):
     """A box in a strong vortex: the cubic alone would ring to below nothing and above all."""
     box = np.zeros((64, 64))
     box[20:40, 25:50] = 1.0
@@ -211,7 +211,7 @@ def test_points_follow_the_flow_to_second_order(make_solver):
     assert np.all(orders > 1.8), (errors, orders)
 
 
-def test_points_stay_inside_walls_and_count_on_across_a_seam(make_solver):
+def test_points_stay_inside_walls_and_are_not_wrapped_at_a_seam(make_solver):
     closed = make_solver(32, 32, viscosity=0.0, stretch=1)
     push = GaussianForce((0.9, 0.5), (50.0, 0.0), 0.2)
     state = run(closed, [push], 10, 0.1, [(0.95, 0.5), (0.02, 0.98)])

@@ -36,7 +36,7 @@ def test_still_fluid_stays_still(make_solver, walls, scheme):
 
 
 @pytest.mark.parametrize("walls", WALLS)
-def test_zero_dt_changes_nothing_but_the_divergence_left(make_solver, walls):
+def test_a_step_of_zero_dt_changes_only_the_remaining_divergence(make_solver, walls):
     """With dt = 0 every stage but the projection is the identity, and that only removes divergence."""
     solver = make_solver(24, 17, walls=walls, viscosity=0.01, pressure_cycles=8)
     start, projected, after = solver.rest(), solver.rest(), solver.rest()
@@ -223,7 +223,7 @@ def test_displacement_falls_with_viscosity(make_solver):
 
 
 @pytest.mark.parametrize("scheme", ["standard", "paper"])
-def test_what_is_pushed_moves_with_the_arrow(make_solver, scheme):
+def test_the_picture_moves_in_the_direction_of_a_push(make_solver, scheme):
     """A push right and down: the point seen at the center came from the left and above."""
     solver = make_solver(64, 48, scheme=scheme)
     state = run(solver, [GaussianForce((0.5, 0.4), (2.0, 1.0), 0.08, Instantaneous(0.0))], 10, 0.01)
@@ -306,7 +306,7 @@ def test_states_of_another_grid_are_refused(make_solver):
             use()
 
 
-def test_graphs_of_passing_states_are_let_go(make_solver):
+def test_graphs_of_states_no_longer_used_are_dropped(make_solver):
     solver = make_solver(8, 8)
     state = solver.rest()
     for _ in range(40):

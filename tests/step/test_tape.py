@@ -1,4 +1,4 @@
-"""A step recorded on a `wp.Tape` is transposed by `tape.backward()`, every stage of it.
+"""`tape.backward()` plays the transpose of a step that a `wp.Tape` recorded, with all its stages.
 
     <y, F(x + h e) - F(x - h e)> / 2h = <F'(x)^T y, e>
 
@@ -47,7 +47,7 @@ CASES = {
     "frozen": ({"viscosity": SMOOTH, "freeze": FREEZE, "pressure_tolerance": 1e-12, **SOLVED}, (PUSH,)),
     "moves": ({"viscosity": SMOOTH, "viscosity_moves": True, **SOLVED}, (PUSH, BUOYANCY)),
 }
-"""Fluids and forces: all stages occur in some, and each without which a step can do is missing in some."""
+"""Fluids and forces. Each stage occurs in some case; each optional stage is missing in some other."""
 
 
 class Recorded:
@@ -80,7 +80,7 @@ class Recorded:
         return [*state.fields, *state.particles]
 
     def set(self, values):
-        """Give the state before values, with their ghosts."""
+        """Set the arrays of the state before, with their ghosts."""
         for f, own, ghosts in zip(self.arrays(self.before), values, [*self._ghosts, None, None], strict=True):
             if ghosts is None:
                 f.assign(own)
@@ -92,7 +92,7 @@ class Recorded:
         self.step.advance(self.before, self.after, self.forcing)
 
     def record(self):
-        """Take the step from the start on a tape, and ask for noise of the state after it."""
+        """Record the step from the start, and set the gradients of the state after it to noise."""
         self.set(self.start)
         with recording() as tape:
             self.advance()
@@ -126,7 +126,7 @@ class Recorded:
         return total, size
 
     def errors(self):
-        """By array of the state before: how far both sides are apart, as a part of their products' sizes."""
+        """By array of the state before: the difference of both sides over the sum of products' sizes."""
         self.record().backward()
         gradients = [wp.clone(f.grad) for f in self.arrays(self.before)]
         errors = {}
@@ -152,8 +152,8 @@ class Recorded:
 
 @pytest.mark.float64
 @pytest.mark.parametrize("name", CASES)
-def test_the_whole_step_is_transposed_by_the_tape(device, name):
-    """With respect to each array that it begins with, whatever the fluid and the forces."""
+def test_the_tape_plays_the_transpose_of_a_step(device, name):
+    """The inner products agree for each array of the state before, for all fluids and forces."""
     errors = Recorded(device, *CASES[name]).errors()
     assert max(errors.values()) <= TOLERANCE, errors
 
@@ -177,8 +177,8 @@ STAGES = {
 
 @pytest.mark.float64
 @pytest.mark.parametrize("stage", STAGES)
-def test_a_stage_that_leaves_no_transpose_on_the_tape_is_noticed(device, monkeypatch, stage):
-    """By the test of the whole step: it launches, and the tape knows nothing of it."""
+def test_a_stage_without_its_transpose_on_the_tape_fails_the_test_of_the_step(device, monkeypatch, stage):
+    """A stage that launches but does not record its transpose makes the inner products differ."""
     kind, transpose, case = STAGES[stage]
 
     def recorded(backward, reads, writes):
@@ -192,8 +192,8 @@ def test_a_stage_that_leaves_no_transpose_on_the_tape_is_noticed(device, monkeyp
 
 
 @pytest.mark.float64
-def test_every_stage_of_a_step_is_among_those_tested(device):
-    """What tapes of all cases hold is what `STAGES` lists, and that gradients begin at 0."""
+def test_every_stage_of_a_step_is_in_the_list_of_stages(device):
+    """The tapes of all cases hold the transposes in `STAGES`, and the record that clears gradients."""
     found = set()
     for case in CASES.values():
         tape = Recorded(device, *case).record()
@@ -203,8 +203,8 @@ def test_every_stage_of_a_step_is_among_those_tested(device):
 
 @pytest.mark.float64
 @pytest.mark.parametrize("name", CASES)
-def test_what_transposes_read_is_found_again_from_the_state(device, name):
-    """Whatever another step has left between the stages; the gradient has the same bits."""
+def test_recompute_restores_all_that_transposes_read(device, name):
+    """After another step has overwritten the arrays between stages, the gradient has the same bits."""
     recorded = Recorded(device, *CASES[name])
     tape, step = recorded.record(), recorded.step
     tape.backward()
@@ -218,12 +218,12 @@ def test_what_transposes_read_is_found_again_from_the_state(device, name):
     recorded.ask()
     step.recompute(recorded.before, recorded.forcing)
     tape.backward()
-    for found, one in zip(recorded.gradients(), expected, strict=True):
-        np.testing.assert_array_equal(found, one)
+    for found, wanted in zip(recorded.gradients(), expected, strict=True):
+        np.testing.assert_array_equal(found, wanted)
 
 
 def test_without_a_tape_nothing_is_recorded_or_allocated(device, monkeypatch):
-    """Nor does a tape launch anything: a step on it has the launches of one without."""
+    """A step on a tape has the same number of launches as one without."""
     fluid = Fluid(viscosity=Painted(SMOOTH), viscosity_moves=True, densities=[INK])
     states = [State.at_rest(GRID, device, 1, 1) for _ in range(2)]
     forces = (PUSH, BUOYANCY)
@@ -254,8 +254,8 @@ def test_without_a_tape_nothing_is_recorded_or_allocated(device, monkeypatch):
     assert tape.launches and counts[0] == counts[1] > 10
 
 
-def test_another_thread_records_nothing_on_the_tape_of_this_one(device):
-    """Two threads may each have a solver, and one of them a tape."""
+def test_a_step_in_another_thread_is_not_recorded_on_this_tape(device):
+    """The tape is that of the thread, so two threads can each have a solver."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
     step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
     step.plan(DT, DT, step.update_coefficients)
@@ -264,8 +264,8 @@ def test_another_thread_records_nothing_on_the_tape_of_this_one(device):
     assert not tape.launches
 
 
-def test_a_stage_on_a_tape_without_gradients_is_refused(device):
-    """A tape around a step whose arrays have no gradients would be silently wrong."""
+def test_recording_a_stage_without_gradients_is_refused(device):
+    """Else the backward pass would be wrong without an error."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
     step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
     step.plan(DT, DT, step.update_coefficients)
@@ -273,8 +273,8 @@ def test_a_stage_on_a_tape_without_gradients_is_refused(device):
         step.advance(*states, acting)
 
 
-def test_gradients_allowed_again_keep_their_arrays(device):
-    """Graphs captured before have the addresses of all that transposes work with."""
+def test_allowing_gradients_twice_keeps_the_arrays(device):
+    """Captured graphs contain the addresses of the transposes' arrays."""
     step = Step(GRID, Fluid(densities=[INK]), device)
     stages = (step.feet, step.advection, step.projection, *step.densities)
     step.allow_gradients()

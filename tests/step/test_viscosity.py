@@ -178,7 +178,7 @@ def test_strain_in_a_stiff_disc_falls_with_the_step(make_solver):
     assert leaks[24] < 0.04 and leaks[96] < 0.5 * leaks[24], leaks
 
 
-def test_freezing_holds_by_degrees_and_still_at_full_strength(make_solver):
+def test_freezing_slows_by_its_strength_and_stops_at_full_strength(make_solver):
     """Displacement in the frozen disc falls with every degree of paint, to less than 1/100 of that around."""
     grid = Grid(64, 64)
     inside = disc(grid, 0.5, 0.22, 0.06)
@@ -214,7 +214,7 @@ def test_a_viscosity_that_moves_goes_with_the_picture(make_solver):
         np.testing.assert_allclose(got, expected, atol=2e-5 * 0.01 + 1e-7)
 
 
-def test_a_viscosity_of_the_time_is_followed(make_solver):
+def test_a_step_uses_the_viscosity_at_its_time(make_solver):
     """Keyed and function: the step that ends at t has the viscosity of t."""
     soft, stiff = np.full((16, 16), 0.001), np.full((16, 16), 0.1)
     for viscosity in (Keyed({1.0: stiff, 0.0: soft}), lambda t: 0.001 + 0.099 * min(max(t, 0.0), 1.0)):
@@ -226,7 +226,7 @@ def test_a_viscosity_of_the_time_is_followed(make_solver):
             np.testing.assert_allclose(got, expected, rtol=1e-6)
 
 
-def test_a_changing_viscosity_equals_a_fixed_one_while_it_does_not_change(make_solver, monkeypatch):
+def test_a_viscosity_function_of_constant_value_gives_the_flow_of_a_painted_one(make_solver, monkeypatch):
     """What is replayed for a viscosity of the time is what was set up for a still one.
 
     But for the pressure kept from step to step, which only a still one may keep.
@@ -275,7 +275,7 @@ def test_a_free_flow_loses_energy_over_many_steps(make_solver, fluid):
 
 
 @pytest.mark.parametrize("first", [1e-39, 1e-12, 1e-4, 1 / 480, 1 / 96, 1.0])
-def test_a_step_of_another_length_adds_nothing(make_solver, first):
+def test_a_change_of_step_length_adds_no_energy(make_solver, first):
     """The pressure of a blow, or of a short step, is not that of the next one of 1/24 s."""
     half = np.kron(np.array([[0.0, 1.0]]), np.ones((32, 16)))
     blow = GaussianForce((0.5, 0.5), (5.0, 0.3), 0.05, Instantaneous(0.0))
@@ -306,14 +306,14 @@ def test_a_fluid_set_to_rest_stays_at_rest(make_solver):
     assert energy(a) == 0
 
 
-def test_a_viscosity_at_the_limit_is_taken_on_any_grid(make_solver):
+def test_a_viscosity_at_the_limit_is_accepted_on_any_grid(make_solver):
     """Resampling rounds; what was within the range stays within."""
     solver = make_solver(24, 24, viscosity=np.full((100, 77), 1000.0))
     a, b = solver.rest(), solver.rest()
     solver.step(a, b, [], 0.0, 0.1)
 
 
-def test_what_failed_once_fails_again(make_solver):
+def test_a_refused_viscosity_is_refused_again(make_solver):
     """A step refused for its viscosity leaves nothing half done."""
     solver = make_solver(24, 24, viscosity=lambda t: -1.0 if t > 0.5 else 0.1)
     a, b = solver.rest(), solver.rest()

@@ -148,24 +148,6 @@ def full(what=SCENE):
     return {table["kind"]: table for table in found} if isinstance(what, MapOf) else found
 
 
-def parts(what, value, path=()):
-    """All parts of a scene: path, part of the schema, value."""
-    yield path, what, value
-    if isinstance(what, ArrayOf | MapOf):
-        items = enumerate(value) if isinstance(what, ArrayOf) else value.items()
-        for name, item in items:
-            yield from parts(what.each, item, (*path, name))
-    elif isinstance(what, Table | Union):
-        for name, key in keys_of(what, value).items():
-            if name in value:
-                yield from parts(key, value[name], (*path, name))
-
-
-def keys_of(what, value):
-    """The possible keys of a table, except its kind."""
-    return what.tables[value["kind"]].keys if isinstance(what, Union) else what.keys
-
-
 def changed(value, path, change):
     """A copy in which the part at a path is replaced by a changed copy."""
     if not path:

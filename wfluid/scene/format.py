@@ -105,7 +105,7 @@ class FluidTable(SceneTable):
         flag="--walls",
     )
     scheme: str = key(
-        "numerical scheme; paper is Euler, bilinear, Jacobi, phase 0",
+        "numerical scheme (paper: Euler, bilinear, Jacobi, phase 0)",
         word(*SCHEMES),
         default=SCHEMES[0],
         flag="--scheme",

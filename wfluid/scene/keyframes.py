@@ -78,8 +78,8 @@ Curve = str | tuple[tuple[float, float], ...]
 
 
 def _curve_key(what: str) -> Any:
-    meaning = f"progress of the {what} over time: linear, ease, or [[s, 0 … 1], …]"
-    return key(meaning, curve(CURVES), default=EASE, flag=f"--{what}-curve", metavar="CURVE")
+    meaning = f"progress of the {what} over time; in a scene file keys are [[s, 0 … 1], …]"
+    return key(meaning, curve(CURVES), default=EASE, flag=f"--{what}-curve", metavar="linear|ease|S:PART,…")
 
 
 class MorphTable(SceneTable):
@@ -93,7 +93,7 @@ class MorphTable(SceneTable):
     warp_curve: Curve = _curve_key("warp")
     blend_curve: Curve = _curve_key("blend")
     blend: str = key(
-        "blend linear light, or display values",
+        "colour values of the blend",
         word(*BLEND_SPACES),
         default=BLEND_SPACES[0],
         flag="--blend",
