@@ -188,7 +188,7 @@ def test_descriptions_load_no_warp(name):
 @pytest.mark.parametrize(
     ("library", "home"),
     [
-        ("OpenImageIO", {"stills", "encoder", "gif", "preview", "report", "picture"}),
+        ("OpenImageIO", {"reading", "stills", "encoder", "gif", "preview", "report", "picture"}),
         ("av", {"movie"}),
         ("matplotlib", {"plot"}),
     ],

@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 import pytest
 from command import wfluid, wfluid_process
 
-from wfluid.pictures import stills
+from wfluid.pictures import reading
 from wfluid.pictures.formats import PictureError
 from wfluid.pictures.picture import Picture
 from wfluid.pictures.stills import read_picture, write_picture
@@ -87,7 +87,7 @@ def test_bad_pictures_are_refused_by_the_command(tmp_path, name):
 
 def test_a_picture_beyond_the_memory_is_refused_before_it_is_taken(small, monkeypatch):
 
-    monkeypatch.setattr(stills, "free_memory", lambda: 1000)
+    monkeypatch.setattr(reading, "free_memory", lambda: 1000)
     with pytest.raises(PictureError, match=r"60 x 40 pixels need about 86.4 kB of memory, 1 kB are free"):
         read_picture(small)
 
@@ -313,7 +313,7 @@ def test_a_movie_read_back_has_its_frames_and_duration(small, tmp_path):
             assert len(frames) == 10 and movie.streams.video[0].average_rate == 15
             assert movie.duration / 1e6 == pytest.approx(10 / 15, abs=0.02)
         picture = read_picture(small).resized(61, 41)
-        from wfluid.pictures.picture import display_rgb
+        from wfluid.pictures.fitting import display_rgb
 
         difference = np.abs(frames[0][:41, :61].astype(int) - display_rgb(picture)).mean()
         assert difference < 3, f"{name}: colours are off by {difference}"

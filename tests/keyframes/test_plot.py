@@ -235,14 +235,14 @@ def test_a_figure_that_fails_leaves_the_old_one(match, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     from matplotlib.figure import Figure
 
-    def fail(self, path, **settings):
-        path.write_bytes(b"half")
-        raise OSError(28, "No space left on device")
+    def fail(self, file, **settings):
+        file.write(b"half")
+        raise RuntimeError("no font")
 
     monkeypatch.setattr(Figure, "savefig", fail)
     path = tmp_path / "a.png"
     path.write_bytes(b"old")
-    with pytest.raises(FileError, match=r"a\.png: cannot be written \(No space left on device\)$"):
+    with pytest.raises(RuntimeError, match="no font"):
         plot_match(match, path)
     assert path.read_bytes() == b"old"
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]

@@ -165,10 +165,12 @@ def _layer_name(file: str) -> str:
 def _outputs(options: argparse.Namespace) -> list[dict[str, Any]]:
     """The outputs: pictures, each with those of the layers beside it; tracks and report."""
     stills, layers = given_keys(options, scene_tables()["output"]), _several(options, "layer")
+    numbered = [name for name in options.output if numbering(Path(name))] or options.output
     found = []
     for name in options.output:
-        found.append({"file": name, **stills})
-        found += [{"file": _beside(name, layer), "of": layer, **stills} for layer in map(_layer_name, layers)]
+        own = stills if name in numbered else {}  # beside stills a movie goes without their settings
+        found.append({"file": name, **own})
+        found += [{"file": _beside(name, layer), "of": layer, **own} for layer in map(_layer_name, layers)]
     tracks = getattr(options, "tracks", None)
     for of, file in (("tracks", tracks), ("report", options.report)):
         if file is not None:

@@ -16,7 +16,7 @@ from wfluid.cli.exits import Exit
 from wfluid.cli.progress import SearchProgress
 from wfluid.cli.report import Report, write_report
 from wfluid.cli.verdicts import judge_folds, judge_loop, judge_match
-from wfluid.cli.writing import Output, kept_frames, open_writers, write_frames
+from wfluid.cli.writing import Output, kept_frames, notes_of_outputs, open_writers, write_frames
 from wfluid.fields.device import kernels_are_built, open_device
 from wfluid.keyframes.match import STOPPED, Match, match_keyframes
 from wfluid.keyframes.plot import plot_match
@@ -43,6 +43,9 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     notes: list[str] = []
     staged = stage_all(scene, options.device, notes.append)
     check_memory(staged.animation, kept_frames(scene), _morph_frames(staged))
+    pair = staged.pair if isinstance(staged, StagedMorph) else None
+    first = pair.a if pair else staged.animation.picture
+    notes += notes_of_outputs(scene, first, staged.animation.layers)
     without_run = bool(options.preview or options.dry_run)
     outputs = [] if without_run else open_writers(scene, staged.animation)
     note = _note(options.quiet)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -16,9 +17,12 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.run import QUEUED_FRAMES, Run
 from wfluid.cli.progress import FrameProgress
 from wfluid.cli.report import Report
-from wfluid.files.output import FrameWriter, open_output
+from wfluid.files.output import FrameWriter, open_output, output_notes
 from wfluid.files.tracks import TrackWriter
+from wfluid.pictures.color import linear_color
+from wfluid.pictures.formats import Encoding
 from wfluid.pictures.picture import Picture
+from wfluid.scene.format import OutputTable
 from wfluid.scene.scene import Scene
 from wfluid.system.interrupt import HeldInterrupt
 from wfluid.view.densities import upsample
@@ -55,9 +59,29 @@ def open_writers(scene: Scene, animation: Animation) -> list[Output]:
         if output.of == "tracks":
             found.append(_track_output(path, max(width, height)))
             continue
-        writer = open_output(path, scene.timeline.fps, output.start, output.encoding)
+        writer = open_output(path, scene.timeline.fps, output.start, _encoding(scene, output))
         found.append(_picture_output(writer, output.of))
     return found
+
+
+def notes_of_outputs(scene: Scene, picture: Picture, layers: Mapping[str, Picture]) -> Iterator[str]:
+    """What outputs do not hold of frames like a picture and of its layers, which a user should know.
+
+    Raises:
+        PictureError: an encoding that an output's format does not support.
+    """
+    for output in scene.outputs:
+        if output.of in ("report", "tracks"):
+            continue
+        density = Picture(np.zeros((1, 1, 1), np.float32), data=True)
+        shown = picture if output.of == "picture" else layers.get(output.of, density)
+        yield from output_notes(scene.folder / output.file, shown, _encoding(scene, output))
+
+
+def _encoding(scene: Scene, output: OutputTable) -> Encoding:
+    """How an output of a scene is written."""
+    background = scene.frames.background
+    return replace(output.encoding, background=None if background is None else linear_color(background))
 
 
 def _track_output(path: Path, side: float) -> Output:

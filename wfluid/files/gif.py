@@ -8,8 +8,9 @@ import numpy as np
 
 from wfluid.files import movie
 from wfluid.pictures.encoder import file_bytes
+from wfluid.pictures.fitting import Color, display_rgb
 from wfluid.pictures.formats import PictureError
-from wfluid.pictures.picture import Picture, display_rgb
+from wfluid.pictures.picture import Picture
 from wfluid.system.atomic import atomic_write
 
 LONGEST_DELAY = 65535
@@ -22,23 +23,24 @@ LEAST_DELAY = 2
 class GifWriter:
     """A writer of endless GIFs, which uses PyAV if it is installed, otherwise OpenImageIO.
 
+    Frames are shown over a `background` in linear light, black by default, where they are transparent.
     Delays are integers in units of 1/100 s. They vary by one unit, so that their mean is 1 / fps.
 
     Raises:
         PictureError: a frame rate beyond the limits of delays.
     """
 
-    def __init__(self, path: Path, fps: float):
+    def __init__(self, path: Path, fps: float, background: Color | None = None):
         if not 100 / LONGEST_DELAY <= fps <= 100 / LEAST_DELAY:
             limits = f"{100 / LONGEST_DELAY:.2g} … {100 // LEAST_DELAY}"
             raise PictureError(f"{path}: a GIF shows {limits} frames a second, not {fps:g}")
-        self.path, self.fps = path, fps
+        self.path, self.fps, self.background = path, fps, background
         self.written: list[Path] = []
         self._frames: list[np.ndarray] = []
 
     def write(self, picture: Picture) -> None:
         """Keep the frame until `close`, because the palette is common to all frames."""
-        self._frames.append(display_rgb(picture))
+        self._frames.append(display_rgb(picture, self.background))
 
     def close(self) -> None:
         """Write the file, if there are frames."""

@@ -12,7 +12,8 @@ from typing import BinaryIO
 import numpy as np
 
 from wfluid.domain.timeline import exact_rate
-from wfluid.pictures.picture import Picture, display_rgb
+from wfluid.pictures.fitting import Color, display_rgb
+from wfluid.pictures.picture import Picture
 from wfluid.system.atomic import atomic_file, writing
 
 CODECS = {
@@ -66,11 +67,12 @@ class _Disk:
 class MovieWriter:
     """A writer of MP4 or WebM that encodes each frame as it comes: 8-bit BT.709, 4:2:0.
 
+    Frames are shown over a `background` in linear light, black by default, where they are transparent.
     The format requires an even width and height: an odd last row or column is repeated.
     """
 
-    def __init__(self, path: Path, fps: float):
-        self.path, self.fps = path, fps
+    def __init__(self, path: Path, fps: float, background: Color | None = None):
+        self.path, self.fps, self.background = path, fps, background
         self.written: list[Path] = []
         self._open, self._frames = ExitStack(), 0
 
@@ -80,7 +82,7 @@ class MovieWriter:
         Raises:
             WriteError: the file cannot be written to its end, as on a full disk.
         """
-        frame = display_rgb(picture)
+        frame = display_rgb(picture, self.background)
         with writing(self.path):
             self._encode(frame)
 

@@ -13,6 +13,7 @@ from wfluid.files.gif import GifWriter
 from wfluid.files.movie import MovieWriter
 from wfluid.files.names import check_folder, numbering
 from wfluid.files.stills import StillsWriter
+from wfluid.pictures.fitting import display_notes, fit
 from wfluid.pictures.formats import Encoding, PictureError
 from wfluid.pictures.picture import Picture
 
@@ -41,7 +42,8 @@ def open_output(
 ) -> FrameWriter:
     """The writer for a name: `x.gif`, `x.mp4`, `x.webm`, or a sequence `x.####.png`, `x.%04d.exr`.
 
-    `start` is the number of the first frame of a sequence, `encoding` the encoding of its stills.
+    `start` is the number of the first frame of a sequence, `encoding` the encoding of its stills; GIFs
+    and movies have its background only.
 
     Raises:
         PictureError: an unknown kind of name, a name that cannot be written to, a movie without the extra
@@ -55,15 +57,31 @@ def open_output(
         if start < 0:
             raise PictureError(f"first frame {start}: expected 0 or more")
         return StillsWriter(path, numbered, start, encoding)
+    encoding.check_movie(path)
     ending = path.suffix.lower()
     if ending == ".gif":
-        return GifWriter(path, fps)
+        return GifWriter(path, fps, encoding.background)
     if ending in movie.CODECS:
         if not movie.available():
             raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
-        return MovieWriter(path, fps)
+        return MovieWriter(path, fps, encoding.background)
     kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
     raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")
+
+
+def output_notes(
+    path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None
+) -> tuple[str, ...]:
+    """What an output does not hold of frames like a picture, which a user should know.
+
+    Raises:
+        PictureError: an encoding that the format does not support.
+    """
+    path, encoding = Path(path), encoding or Encoding()
+    if numbering(path) is not None:
+        return fit(path, picture, encoding).notes
+    encoding.check_movie(path)
+    return display_notes(path, picture)
 
 
 class HasPicture(Protocol):

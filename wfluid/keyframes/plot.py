@@ -24,7 +24,8 @@ from wfluid.files.names import check_folder
 from wfluid.keyframes.arrival import Arrival
 from wfluid.keyframes.match import Match
 from wfluid.keyframes.search import COARSE, FINE, MARCH
-from wfluid.pictures.picture import Picture, encode
+from wfluid.pictures.fitting import display_rgb
+from wfluid.pictures.picture import Picture
 from wfluid.system.atomic import atomic_write
 from wfluid.system.errors import FileError
 
@@ -164,8 +165,8 @@ def _last_frame(animation: Animation) -> Frame:
 def _show(axes: Axes, shown: Picture, extent: tuple[int, int], light: float) -> None:
     """Draw a picture on axes in the pixels of `extent`, covered by white of opacity `light`."""
     width, height = extent
-    colours, _ = encode(shown.shrunk(*_small(shown)), "uint8", linear=False, channels=3)
-    colours = np.broadcast_to(colours, (*colours.shape[:2], 3)) / 255
+    whole = replace(shown, metadata=None)  # not its display window alone
+    colours = display_rgb(whole.shrunk(*_small(shown))) / 255
     colours = colours + light * (1 - colours)
     axes.imshow(colours, extent=(0, width, height, 0), interpolation="antialiased")
     axes.set(xlim=(0, width), ylim=(height, 0), aspect="equal", anchor="NW")

@@ -6,6 +6,9 @@ from functools import cache
 
 import numpy as np
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of red, green and blue (Rec. 709)."""
+
 _CODES = {"uint8": 255, "uint16": 65535}
 _LADDER = 1 << 16
 
@@ -34,10 +37,12 @@ def decode(stored: np.ndarray, srgb: bool) -> np.ndarray:
 
 
 def encode(linear: np.ndarray, dtype: str, srgb: bool) -> np.ndarray:
-    """Linear light as numbers of `dtype`, rounded to the nearest code within the range of the type."""
+    """Linear light as numbers of `dtype`, rounded to the nearest one within the range of the type."""
     top = _CODES.get(dtype)
     if top is None:
-        return (to_srgb(linear) if srgb else linear).astype(dtype)
+        limit = np.finfo(dtype).max
+        values = to_srgb(linear) if srgb else linear
+        return (np.clip(values, -limit, limit) if dtype == "float16" else values).astype(dtype)
     if dtype == "uint8" and srgb:  # a table over the square root: 4 times faster than the power
         steps = np.sqrt(np.clip(linear, 0.0, 1.0), dtype=np.float32) * np.float32(_LADDER - 1)
         return _srgb_codes()[(steps + np.float32(0.5)).astype(np.uint16)]

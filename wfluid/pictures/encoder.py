@@ -50,6 +50,7 @@ def _write(path: Path, name: str, specs: Sequence, images: Sequence[np.ndarray])
     """
     import OpenImageIO as oiio
 
+    oiio.attribute("tiff:half", 1)  # without it, half is written as float
     out = oiio.ImageOutput.create(f"x{path.suffix}")
     if out is None:
         raise PictureError(f"{path}: cannot be written ({first_line(oiio.geterror())})")

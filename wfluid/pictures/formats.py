@@ -28,8 +28,26 @@ WRITES = {
 }
 """Formats that stills are written in, and the number types of each, the default first."""
 
-CHANNELS = {".jpg": 3, ".jpeg": 3, ".hdr": 3, ".bmp": 3, ".png": 4, ".webp": 4, ".tga": 4, ".dpx": 4}
-"""Most channels that a format holds, where that is limited; 3 channels include no alpha."""
+CHANNELS = {
+    ".jpg": (1, 3),
+    ".jpeg": (1, 3),
+    ".hdr": (3,),
+    ".bmp": (1, 3),
+    ".png": (1, 2, 3, 4),
+    ".webp": (3, 4),
+    ".tga": (1, 3, 4),
+    ".dpx": (1, 3, 4),
+}
+"""Numbers of channels that a format holds, where they are limited; 2 and 4 include alpha."""
+
+PROFILES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+"""Formats that hold ICC profiles."""
+
+POSITIVE = (".hdr",)
+"""Formats of light that hold no negative values: RGBE has no sign."""
+
+WINDOWS = (".exr",)
+"""Formats that hold a display window beside the data's."""
 
 _COMPRESSIONS = {
     ".exr": ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"),
@@ -61,6 +79,8 @@ class Encoding:
     """Lossless or lossy method, for EXR and TIFF."""
     quality: int | None = None
     """1 … 100, for JPEG and WebP."""
+    background: tuple[float, float, float] | None = None
+    """Colour behind a transparent picture in files without alpha, in linear light; None for black."""
 
     def __post_init__(self) -> None:
         if self.type is not None:
@@ -89,6 +109,17 @@ class Encoding:
             )
         if self.quality is not None and ending not in QUALITIES:
             raise PictureError(f"{path}: {ending} has no quality; {', '.join(QUALITIES)} have")
+
+    def check_movie(self, path: Path) -> None:
+        """Check that nothing is set that GIFs and movies do not have.
+
+        Raises:
+            PictureError: a setting of stills; the message names it.
+        """
+        for name in ("type", "compression", "quality"):
+            if getattr(self, name) is not None:
+                kind = path.suffix.lower()
+                raise PictureError(f"{path}: {kind} has no {name}; it is for stills, such as x.####.png")
 
 
 def first_line(message: str) -> str:

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from wfluid.pictures import color
-from wfluid.pictures.formats import LINEAR, NUMPY, PictureError, first_line
-
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Weights of red, green and blue (Rec. 709)."""
+from wfluid.pictures.color import LUMINANCE
+from wfluid.pictures.formats import LINEAR, PictureError, first_line
+from wfluid.pictures.profiles import Profile
 
 
 @dataclass(frozen=True)
 class Picture:
-    """An image in linear light, alpha premultiplied."""
+    """An image in linear light with the primaries of Rec. 709, alpha premultiplied."""
 
     pixels: np.ndarray
-    """Values (height, width, channels), float32; row 0 is the top."""
+    """Values (height, width, channels), float32; row 0 is the top. Colours beyond Rec. 709 have negative
+    values."""
     alpha: int | None = None
     """Index of the alpha channel."""
     dtype: str = "float"
@@ -30,6 +30,10 @@ class Picture:
     """Whether the file's numbers are sRGB; None for the default of the number type."""
     data: bool = False
     """Whether the numbers are not colours, so that files store them unconverted."""
+    profile: Profile | None = None
+    """Colour space of the file's numbers, where its ICC profile says another than sRGB."""
+    notes: tuple[str, ...] = ()
+    """What a user should know of how the file was read."""
 
     @property
     def width(self) -> int:
@@ -97,7 +101,9 @@ def as_stored(picture: Picture) -> np.ndarray:
         stored[..., colours] = np.divide(
             pixels[..., colours], opacity, out=np.zeros_like(pixels[..., colours]), where=opacity > 0
         )
-    if picture.dtype not in LINEAR if picture.srgb is None else picture.srgb:
+    if picture.profile is not None and len(picture.profile.curves) == len(colours):
+        stored[..., colours] = picture.profile.encode(stored[..., colours])
+    elif picture.dtype not in LINEAR if picture.srgb is None else picture.srgb:
         stored[..., colours] = color.to_srgb(stored[..., colours])
     return stored
 
@@ -116,45 +122,16 @@ def intensity(picture: Picture) -> np.ndarray:
         PictureError: a value that is negative or not finite.
     """
     pixels, alpha = picture.pixels, picture.alpha
-    wrong = ~np.isfinite(pixels) | (pixels < -_RINGING)
+    stored = as_stored(picture)
+    checked = pixels if picture.profile is None else stored  # of wide colours, Rec. 709 values are negative
+    wrong = ~np.isfinite(checked) | (checked < -_RINGING)
     if wrong.any():
-        value = pixels[wrong].flat[0]
+        value = checked[wrong].flat[0]
         raise PictureError(
             f"a picture with the value {value} has no intensity: expected finite values from 0 on"
         )
     colours = picture.color_channels[:3]
     weights = LUMINANCE if len(colours) == 3 else (1.0,)
-    stored = as_stored(picture)
     grey = sum(weight * stored[..., channel] for weight, channel in zip(weights, colours, strict=False))
     opacity = pixels[..., alpha] if alpha is not None else np.float32(1.0)
     return np.round(np.clip(grey, 0.0, 1.0) * opacity, 6)  # white is 1: conversions may round to less
-
-
-def encode(picture: Picture, dtype: str, linear: bool, channels: int) -> tuple[np.ndarray, int | None]:
-    """A picture's numbers as a file of at most `channels` channels stores them, and the index of alpha.
-
-    Files of up to three channels hold no alpha. In linear files colours stay premultiplied; in display
-    files they are divided by alpha first.
-    """
-    pixels, alpha = picture.pixels, picture.alpha
-    if alpha is not None and channels <= 3:
-        pixels, alpha = np.delete(pixels, alpha, axis=2), None
-    pixels = pixels[..., :channels] if alpha is None or alpha < channels else pixels[..., :3]
-    if channels == 3 and pixels.shape[2] == 2:
-        pixels = pixels[..., :1]
-    kind, srgb = NUMPY[dtype], not linear and not picture.data
-    if linear or alpha is None:
-        return color.encode(pixels, kind, srgb=srgb), alpha
-    opacity = pixels[..., [alpha]]
-    straight = np.divide(pixels, opacity, out=np.zeros_like(pixels), where=opacity > 0)
-    stored = color.encode(straight, kind, srgb=srgb)
-    stored[..., alpha] = color.encode(pixels[..., alpha], kind, srgb=False)
-    return stored, alpha
-
-
-def display_rgb(picture: Picture) -> np.ndarray:
-    """A picture as 8-bit sRGB (height, width, 3), over black where it is transparent; grey is repeated."""
-    stored, _ = encode(picture, "uint8", linear=False, channels=3)
-    if stored.shape[2] < 3:
-        stored = np.repeat(stored[..., :1], 3, axis=2)
-    return np.ascontiguousarray(stored)

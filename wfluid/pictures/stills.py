@@ -8,28 +8,26 @@ from pathlib import Path
 import numpy as np
 
 from wfluid.domain.checks import check_word
-from wfluid.domain.limits import COLORSPACES, TYPES
+from wfluid.domain.limits import COLORSPACES
 from wfluid.pictures import color
 from wfluid.pictures.encoder import file_bytes
-from wfluid.pictures.formats import (
-    CHANNELS,
-    LARGEST,
-    LINEAR,
-    QUALITIES,
-    WRITES,
-    Encoding,
-    PictureError,
-    first_line,
-)
-from wfluid.pictures.picture import Picture, channels_beside, encode
+from wfluid.pictures.fitting import Fit, display_window, fit, stored
+from wfluid.pictures.formats import CHANNELS, LARGEST, LINEAR, QUALITIES, Encoding, PictureError
+from wfluid.pictures.picture import Picture, channels_beside
+from wfluid.pictures.reading import Stored, read_stored
 from wfluid.system.atomic import atomic_write
-from wfluid.system.memory import free_memory, readable_size
-from wfluid.system.stderr import quiet_stderr
 
-SIDE_LIMIT = 65_535
-"""Longest side of a picture [px], limited by most formats and by 32-bit indices."""
-
-_NOT_KEPT = ("oiio:UnassociatedAlpha", "oiio:ColorSpace", "compression", "CompressionQuality", "Orientation")
+_NOT_KEPT = (
+    "oiio:UnassociatedAlpha",
+    "oiio:ColorSpace",
+    "compression",
+    "CompressionQuality",
+    "Orientation",
+    "jpeg:ColorSpace",
+    "planarconfig",
+    "tiff:.*",
+)
+"""Attributes of a file that hold for it alone."""
 
 _UPRIGHT = {
     1: lambda a: a,
@@ -45,66 +43,85 @@ _UPRIGHT = {
 
 
 def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
-    """Read a still in any format that OpenImageIO reads; of a file with several pictures, the first.
+    """Read a still in any format that OpenImageIO reads.
 
-    `colorspace` is the encoding of the file's numbers: "srgb", "linear", "auto" (sRGB for integers, linear
-    for half and float) or "data" (no colours; numbers are written as they are read). Alpha is linear in all
-    files. Straight colours are linearised and then multiplied by alpha. The EXIF orientation is applied. NaN
-    becomes 0, infinite values the largest half.
+    Of a file with pictures of several sizes, such as an icon or a TIFF, the largest is read, of an animation
+    the first frame; `Picture.notes` says so.
+
+    `colorspace` is the encoding of the file's numbers: "srgb", "linear", "auto" (that of the ICC profile,
+    otherwise sRGB for integers, linear for half and float) or "data" (no colours; numbers are written as they
+    are read). Alpha is linear in all files. Straight colours are linearised and then multiplied by alpha.
+    32-bit integers in OpenEXR, and one or two channels of them in other formats, are data, read as they are;
+    alpha without colours is data too. The EXIF orientation is applied. NaN becomes 0, infinite values the
+    largest half.
 
     Raises:
-        PictureError: a file that is missing, unreadable, damaged or too large for the memory; with `exact`,
-            also one with values that are not finite.
+        PictureError: a file that is missing, unreadable, damaged, deep or too large for the memory; with
+            `exact`, also one with values that are not finite.
     """
-    import OpenImageIO as oiio
-
     path = Path(path)
     check_word("colorspace", colorspace, COLORSPACES, PictureError)
-    if not path.is_file():
-        why = "is a folder, not a picture" if path.is_dir() else "no such picture"
-        raise PictureError(f"{path}: {why}")
-    if path.stat().st_size == 0:
-        raise PictureError(f"{path}: the file is empty")
-    hints = oiio.ImageSpec()
-    hints.attribute("oiio:UnassociatedAlpha", 1)
-    with quiet_stderr():
-        source = oiio.ImageInput.open(str(path), hints)
-        if source is None:
-            raise PictureError(f"{path}: not a picture that can be read ({first_line(_message(oiio))})")
-        try:
-            spec = source.spec()
-            _check_size(path, spec)
-            dtype = _type_of(str(spec.format))
-            stored = source.read_image(0, 0, 0, spec.nchannels, dtype)
-            message = _message(source)
-        finally:
-            source.close()
-    if stored is None or message:
-        raise PictureError(f"{path}: damaged or cut off ({first_line(message)})")
-    stored = np.asarray(stored).reshape(spec.height, spec.width, spec.nchannels)
-    if dtype == "half":
-        stored = stored.view(np.float16) if stored.dtype != np.float16 else stored
-    alpha = spec.alpha_channel if 0 <= spec.alpha_channel < spec.nchannels else None
-    srgb = colorspace == "srgb" or (colorspace == "auto" and dtype not in LINEAR)
-    pixels = np.empty(stored.shape, dtype=np.float32)
-    for channel in range(spec.nchannels):
-        pixels[..., channel] = color.decode(stored[..., channel], srgb and channel != alpha)
-    if alpha is not None and spec.get_int_attribute("oiio:UnassociatedAlpha"):
-        colours = channels_beside(alpha, spec.nchannels)
-        pixels[..., colours] *= pixels[..., [alpha]]
+    read = read_stored(path, colorspace)
+    data = read.data or colorspace == "data"
+    srgb = colorspace == "srgb" or (colorspace == "auto" and read.integers and not data)
+    pixels = _linear(read, srgb)
     if exact and not np.isfinite(pixels).all():
         raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
     pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
-    upright = _UPRIGHT.get(spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
-    return Picture(np.ascontiguousarray(upright(pixels)), alpha, dtype, spec, srgb, data=colorspace == "data")
+    upright = _UPRIGHT.get(read.spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
+    return Picture(
+        np.ascontiguousarray(upright(pixels)),
+        read.alpha,
+        read.dtype,
+        read.spec,
+        srgb,
+        data=data,
+        profile=read.profile,
+        notes=read.notes,
+    )
+
+
+def _linear(read: Stored, srgb: bool) -> np.ndarray:
+    """The numbers of a file in linear light, multiplied by alpha.
+
+    Where integers are multiplied by alpha already, that was done to the encoded numbers, which are divided by
+    it before they are decoded.
+    """
+    numbers, alpha, profile = read.numbers, read.alpha, read.profile
+    colours = channels_beside(alpha, numbers.shape[2])
+    pixels = np.empty(numbers.shape, dtype=np.float32)
+    for channel in range(numbers.shape[2]):
+        coded = srgb and profile is None and channel != alpha
+        pixels[..., channel] = color.decode(numbers[..., channel], coded)
+    if alpha is None:
+        return pixels if profile is None else profile.decode(pixels)
+    opacity = pixels[..., [alpha]]
+    if read.straight or not (srgb or profile):
+        if profile is not None:
+            pixels[..., colours] = profile.decode(pixels[..., colours])
+        if read.straight:
+            pixels[..., colours] *= opacity
+        return pixels
+    stored = color.decode(numbers[..., colours], False)
+    partly = (opacity > 0) & (opacity < 1)
+    straight = np.divide(stored, opacity, out=stored.copy(), where=partly)
+    if profile is None:
+        light = np.where(partly, color.to_linear(straight), pixels[..., colours])
+    else:
+        light = profile.decode(straight)
+    pixels[..., colours] = np.where(partly, light * opacity, light)
+    return pixels
 
 
 def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
     """Write a still, completely or not at all, in the format of the name's ending.
 
-    The number type is that of the picture if the format supports it, otherwise the default of the format.
-    Channels that the format does not support are dropped; without alpha the picture is over black. Metadata
-    are kept, as are display and data windows if the size is unchanged.
+    The number type is that of the picture if the format supports it, otherwise the default of the format;
+    values are clamped to its range. Channels that the format does not support are dropped; without alpha the
+    picture is over the encoding's background. Grey becomes colours where a format has only those. Metadata
+    are kept, an ICC profile in integer files of formats that have one; otherwise numbers are sRGB, or linear
+    with the primaries of Rec. 709. EXR files keep display and data windows, in proportion to their size;
+    other formats show the display window.
 
     Raises:
         FileError: a name that cannot be written to; a PictureError for an unknown format, an unsupported
@@ -112,75 +129,48 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
         WriteError: the file cannot be written to its end, as on a full disk.
     """
     path, encoding = Path(path), encoding or Encoding()
-    encoding.check(path)
+    how = fit(path, picture, encoding)
     ending = path.suffix.lower()
-    own = picture.dtype if picture.dtype in WRITES[ending] else WRITES[ending][0]
-    dtype = encoding.type or own
-    linear = dtype in LINEAR
-    stored, alpha = encode(picture, dtype, linear, CHANNELS.get(ending, 1024))
-    spec = _spec_for(picture, stored.shape, dtype)
-    spec.alpha_channel = -1 if alpha is None else alpha
-    if alpha is not None and not linear:
-        spec.attribute("oiio:UnassociatedAlpha", 1)
+    numbers = stored(picture, how)
+    spec = _spec_for(picture, numbers.shape, how, ending)
     if encoding.compression is not None:
         spec.attribute("compression", encoding.compression)
     if encoding.quality is not None:
         spec.attribute("compression", f"{QUALITIES[ending]}:{encoding.quality}")
-    atomic_write(path, file_bytes(path, [spec], [stored]), sync=False)
+    atomic_write(path, file_bytes(path, [spec], [numbers]), sync=False)
 
 
-def _spec_for(picture: Picture, shape: tuple[int, ...], dtype: str):
-    """The spec of the file that the picture came from, if any, adapted to shape and number type."""
+def _spec_for(picture: Picture, shape: tuple[int, ...], how: Fit, ending: str):
+    """The spec of the file that the picture came from, if any, adapted to a file's numbers."""
     import OpenImageIO as oiio
 
     height, width, channels = shape
     spec = oiio.ImageSpec(picture.metadata) if picture.metadata is not None else oiio.ImageSpec()
-    names = spec.channelnames
-    upright = spec.get_int_attribute("Orientation", 1) == 1
-    if (spec.width, spec.height) != (width, height) or not upright:
-        spec.x = spec.y = spec.full_x = spec.full_y = 0
-        spec.full_width, spec.full_height = width, height
+    names, window = spec.channelnames, None if how.window else display_window(picture)
+    spec.x, spec.y = (-window.x, -window.y) if window else (0, 0)
+    spec.full_x = spec.full_y = 0
+    spec.full_width, spec.full_height = (window.width, window.height) if window else (width, height)
     spec.width, spec.height, spec.depth = width, height, 1
     spec.tile_width = spec.tile_height = spec.tile_depth = 0
     spec.nchannels = channels
     spec.channelformats = ()
-    spec.default_channel_names()
-    if len(names) == channels:
-        spec.channelnames = names
-    spec.set_format(oiio.TypeDesc(dtype))
+    kept = ending not in CHANNELS and len(names) == channels and how.channels == tuple(range(channels))
+    spec.channelnames = names if kept else _names(channels, how.alpha)
+    spec.alpha_channel = -1 if how.alpha is None else how.alpha
+    spec.set_format(oiio.TypeDesc(how.dtype))
     for name in _NOT_KEPT:
         spec.erase_attribute(name)
+    if ending != ".dpx":
+        spec.erase_attribute("oiio:BitsPerSample")
+    if how.dtype in LINEAR or (picture.profile is not None and how.profile is None):
+        spec.erase_attribute("ICCProfile.*")
+    if how.alpha is not None and how.dtype not in LINEAR:
+        spec.attribute("oiio:UnassociatedAlpha", 1)
     return spec
 
 
-def _check_size(path: Path, spec) -> None:
-    """Check the size of a picture before memory is allocated.
-
-    Raises:
-        PictureError: a size out of range, or one that exceeds the free memory.
-    """
-    if not (1 <= spec.width <= SIDE_LIMIT and 1 <= spec.height <= SIDE_LIMIT and spec.depth == 1):
-        size = f"{spec.width} x {spec.height} x {spec.depth}"
-        raise PictureError(f"{path}: {size} pixels; sides of 1 … {SIDE_LIMIT} can be read")
-    need, there = 12 * spec.width * spec.height * max(spec.nchannels, 1), free_memory()
-    if need > there:
-        raise PictureError(
-            f"{path}: {spec.width} x {spec.height} pixels need about {readable_size(need)} of memory, "
-            f"{readable_size(there)} are free; make the picture smaller first"
-        )
-
-
-def _type_of(format_name: str) -> str:
-    if format_name in TYPES:
-        return format_name
-    return {"double": "float", "int8": "uint8", "uint32": "float", "int32": "float"}.get(
-        format_name, "uint16"
-    )
-
-
-def _message(library) -> str:
-    """OpenImageIO's message, which cannot be decoded if it quotes bytes of a damaged file."""
-    try:
-        return library.geterror()
-    except UnicodeDecodeError:
-        return "invalid file structure"
+def _names(channels: int, alpha: int | None) -> tuple[str, ...]:
+    """Names of channels: none but alpha is called A."""
+    colors = channels - (alpha is not None)
+    usual = iter(["Y"] if colors == 1 else ["R", "G", "B", *(f"channel{n}" for n in range(3, channels))])
+    return tuple("A" if n == alpha else next(usual) for n in range(channels))

@@ -216,6 +216,12 @@ class FramesTable(SceneTable):
     )
     filter: str = key("interpolation between pixels", word(*FILTERS), default=FILTER, flag="--filter")
     edge: str = key("values beyond the edges of the picture", word(*EDGES), default=EDGE, flag="--edge")
+    background: str | None = key(
+        "colour behind a transparent picture in outputs without alpha: GIF, movies, JPEG, HDR, BMP",
+        color(),
+        otherwise="black",
+        flag="--background",
+    )
 
 
 class GroupTable(SceneTable):

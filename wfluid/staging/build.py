@@ -21,7 +21,6 @@ from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.color import linear_color
 from wfluid.pictures.pairing import PicturePair
 from wfluid.pictures.picture import Picture
-from wfluid.pictures.stills import read_picture
 from wfluid.scene.forces import SEED_LIMIT
 from wfluid.scene.format import DensityTable, FramesTable, GroupTable, SourceTable
 from wfluid.scene.keyframes import KeyframesTable, MorphTable
@@ -29,7 +28,7 @@ from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SchemaError, blame
 from wfluid.staging.aims import Aims, aims_of, moves_of
 from wfluid.staging.drawing import Drawing
-from wfluid.staging.images import SceneImages, frame_size
+from wfluid.staging.images import SceneImages, frame_size, read_noted
 from wfluid.staging.morphs import pair_of, place_in_second, settings_of
 from wfluid.staging.timing import envelope_and_scale
 
@@ -103,7 +102,7 @@ class _Builder:
         self.scene, self.note = scene, note
         self._fluid()  # errors that need no files come before the files are read
         self.timeline = FLOW if scene.morph else scene.timeline
-        self.picture = read_picture(scene.folder / scene.picture.file, scene.picture.colorspace)
+        self.picture = read_noted(scene.folder, scene.picture.file, note, scene.picture.colorspace)
         self.images = SceneImages(self.picture, scene.folder, note)
         self.drawing = self._drawing()
 

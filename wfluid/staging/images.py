@@ -42,6 +42,16 @@ def frame_size(size: Point | None, table: str, picture: Picture) -> tuple[float,
     return width, height
 
 
+def read_noted(
+    folder: Path, name: str, note: Callable[[str], None], colorspace: str = "auto", *, exact: bool = False
+) -> Picture:
+    """A picture, as by `read_picture`, with a note for each thing to know of how it was read."""
+    picture = read_picture(folder / name, colorspace, exact=exact)
+    for text in picture.notes:
+        note(f"{name}: {text}")
+    return picture
+
+
 @dataclass
 class SceneImages:
     """Reads the controls of one picture, and notes anything unusual about them."""
@@ -61,7 +71,7 @@ class SceneImages:
         """
         if name == SELF:
             return self.picture
-        painting = read_picture(self.folder / name, exact=True)
+        painting = read_noted(self.folder, name, self.note, exact=True)
         aspect = painting.width / painting.height * self.picture.height / self.picture.width
         if abs(aspect - 1) > SAME_ASPECT:
             self.note(
@@ -145,7 +155,7 @@ class SceneImages:
         Raises:
             PictureError: the file cannot be read.
         """
-        picture = read_picture(self.folder / name)
+        picture = read_noted(self.folder, name, self.note)
         channels = picture.pixels.shape[2] - (picture.alpha is not None)
         data = channels == 1 if data is None else data
         return read_picture(self.folder / name, "data") if data else picture

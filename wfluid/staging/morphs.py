@@ -5,11 +5,10 @@ from __future__ import annotations
 from wfluid.domain.paths import Place
 from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.pairing import PicturePair, paired
-from wfluid.pictures.stills import read_picture
 from wfluid.scene.keyframes import Curve, MorphTable
 from wfluid.scene.scene import Scene
 from wfluid.staging.drawing import Drawing
-from wfluid.staging.images import SceneImages, frame_size
+from wfluid.staging.images import SceneImages, frame_size, read_noted
 
 
 def pair_of(scene: Scene, morph: MorphTable, images: SceneImages) -> PicturePair:
@@ -19,7 +18,7 @@ def pair_of(scene: Scene, morph: MorphTable, images: SceneImages) -> PicturePair
         PictureError: the second cannot be read.
         SchemaError: a size of another aspect.
     """
-    other = read_picture(scene.folder / morph.to, scene.picture.colorspace)
+    other = read_noted(scene.folder, morph.to, images.note, scene.picture.colorspace)
     pair = paired(images.picture, other, morph.fit)
     for text in pair.notes:
         images.note(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -157,7 +158,17 @@ class LookUp:
         quads = [interior(read(out), self.layout) for out in self.shown]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
         pixels = np.array(pixels[..., : self.source.channels], dtype=np.float32, order="C")  # a copy
+        if self.source.alpha is not None:  # filters overshoot, which colours may
+            opacity = pixels[..., self.source.alpha]
+            np.clip(opacity, *self._opacities, out=opacity)
         return replace(self.picture, pixels=pixels, alpha=self.source.alpha)
+
+    @cached_property
+    def _opacities(self) -> tuple[float, float]:
+        """The smallest and largest alpha: 0 and 1, unless those of the picture are beyond."""
+        alpha = self.picture.alpha
+        opacity = np.zeros(1) if alpha is None else self.picture.pixels[..., alpha]
+        return min(0.0, float(opacity.min())), max(1.0, float(opacity.max()))
 
     @property
     def untouched(self) -> Picture:
