@@ -28,9 +28,10 @@ def checkerboard(width=64, height=48):
 @given(st.floats(0.05, 30), st.sampled_from([12.0, 15.0, 23.976, 24.0, 25.0, 29.97, 60.0]))
 def test_frames_lie_at_multiples_of_the_step(duration, fps):
     timeline = Timeline(duration, fps)
-    assert timeline.frames == round(duration * fps) + 1
+    assert timeline.fps == pytest.approx(fps, rel=2e-4)  # 29.97 is 30000/1001, 23.98 is 24000/1001
+    assert timeline.frames == round(duration * timeline.fps) + 1
     assert timeline.dt <= 1 / 96 + 1e-12
-    assert timeline.steps_per_frame * timeline.dt == pytest.approx(1 / fps)
+    assert timeline.steps_per_frame * timeline.dt == pytest.approx(1 / timeline.fps)
 
 
 @pytest.mark.parametrize(
