@@ -64,19 +64,20 @@ def test_an_objective_keeps_its_numbers_when_the_arrays_it_was_made_of_change(ma
 
 def test_a_misfit_counts_every_particle_by_its_weight(make):
     """1/2 sum of weight |x - destination|^2; where the particles rest that is known beforehand."""
-    misfit = ParticleMisfit(POINTS, POINTS + (0.03, 0.04), 0.125, [5.0, 0.5])
+    off = np.array([(0.03, 0.04), (0.03, 0.04)])
+    misfit = ParticleMisfit(POINTS, POINTS + off, 0.125, [5.0, 0.5])
     functional = make(misfit)
     value, _ = functional.value_and_gradient(np.zeros(2))
     assert value == pytest.approx(0.5 * (5.0 + 0.5) * 0.05**2, rel=1e-5)
-    moved = POINTS + [(0.0, 0.01), (0.02, 0.0)]
-    value, slope = misfit.at(0.125, moved)
+    by = np.array([(0.0, 0.01), (0.02, 0.0)])
+    value, slope = misfit.at(0.125, POINTS + by)
     assert value == pytest.approx(0.5 * (5.0 * 0.0018 + 0.5 * 0.0017))
     np.testing.assert_allclose(slope, [(-0.15, -0.15), (-0.005, -0.02)])
 
 
 @pytest.mark.parametrize("step", [8, 11, 5, 14])
 def test_a_blow_where_two_steps_meet_costs_its_effort_once(request, step):
-    """1/2 |V|^2 sigma^2 pi for a blow V; step 8 of 1/48 s, computed from its start, ends after step 9 starts."""
+    """1/2 |V|^2 pi sigma^2 for a blow V, by a step: whichever way rounding moves the step's start."""
     timeline = Timeline(17 / 48, fps=24, substeps=2)
     blow = GaussianForce((0.5, 0.35), (0.3, -0.2), 0.06, Instantaneous(timeline.time_of(step)))
     misfit, device = Effort(), request.config.getoption("--device")

@@ -206,7 +206,7 @@ def test_a_journey_counts_half_the_squares_of_misfits_in_units_of_a_radius(led):
 
 
 def test_a_keyframe_counts_as_much_as_its_weight():
-    """phi = 1/2 sum of weight |q - K|^2 / r^2, keyframe by keyframe, and its gradient; misfits are not weighted."""
+    """phi = 1/2 sum of weight |q - K|^2 / r^2, and its gradient; misfits are not weighted."""
     keyframes = [
         ParticleKeyframe((0.3, 0.4), (0.5, 0.3), 0.5, weight=7.0),
         ParticleKeyframe((0.3, 0.4), (0.6, 0.3), 1.0, weight=0.25),

@@ -75,7 +75,7 @@ def test_vectors_are_read_with_zero_at_half_range():
 
 @pytest.mark.parametrize(("walls", "wraps"), [("periodic,free-slip", 0), ("free-slip,periodic", 1)])
 def test_vectors_meet_across_the_seam_of_their_own_axis(walls, wraps):
-    """A face has the mean of the two centres beside it: across a seam the last and the first; none on a wall."""
+    """A face has the mean of the two centres beside it, across a seam the last and the first; a wall has 0."""
     vectors = np.random.default_rng(5).uniform(-1, 1, (18, 24, 2))
     force = ImageForce(vectors, "vectors", 2.0).fields(GRID, Walls.parse(walls))[0]
     for n, (got, centres) in enumerate(zip(force, np.moveaxis(vectors, 2, 0), strict=True)):

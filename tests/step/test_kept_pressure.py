@@ -1,7 +1,7 @@
 """The pressure that a step keeps of the step before: as much as its own length makes of it, or none.
 
-The pressure of a step of dt is q = dt p [longer side^2/s], p the fluid's own. The next step, of dt', begins with
-dt' p = dt' / dt q, as long as p goes on: not from a step in which divergence is prescribed, or into one.
+The pressure of a step of dt is q = dt p [longer side^2/s], p the fluid's own. The next step, of dt', begins
+with dt' p = dt' / dt q, as long as p goes on: not from a step with prescribed divergence, nor into one.
 """
 
 import numpy as np
