@@ -1,6 +1,7 @@
 """The command: what it writes, what it refuses."""
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -55,6 +56,22 @@ def test_animate_writes_a_gif_and_a_report(small, tmp_path):
     assert 0.9 < report["jacobian_min"] <= 1 <= report["jacobian_max"] < 1.1
     assert report["outside_fraction"] == 0
     assert oiio.ImageInput.open(str(tmp_path / "a.gif")).seek_subimage(4, 0)
+
+
+@pytest.mark.parametrize("size", [(60, 40), (40, 60)], ids=["landscape", "portrait"])
+def test_tracks_are_in_pixels_of_the_picture_whichever_side_is_longer(tmp_path, size):
+    """Nothing moves a point that no force acts on; a push carries it by its arrow, in pixels."""
+    width, height = size
+    path, out = tmp_path / "picture.png", tmp_path / "t.csv"
+    write_picture(path, Picture(np.full((height, width, 3), 0.5, np.float32), dtype="uint8"))
+    push = ("--push", "20,25:0,4:radius=6", "--viscosity", 1e-5)
+    tracks = ("--track", "20,25", "--track", "39,39", "--tracks", out, "--cells", 60)
+    result = wfluid("animate", path, "-o", tmp_path / "a.gif", "--duration", 0.2, "--fps", 10, *push, *tracks)
+    assert result.returncode == 0, result.stderr
+    rows = [[float(value) for value in row.split(",")] for row in out.read_text().split()[1:]]
+    assert rows[:2] == [[0, 0, 0, 20, 25], [0, 0, 1, 39, 39]] and len(rows) == 6
+    (_, time, _, x, y), (*_, far_x, far_y) = rows[-2:]
+    assert time == 0.2 and abs(x - 20) < 0.5 and 25.3 < y < 29 and math.hypot(far_x - 39, far_y - 39) < 2
 
 
 def test_the_first_frame_of_a_sequence_is_the_picture_itself(small, tmp_path):

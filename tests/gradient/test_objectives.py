@@ -13,6 +13,7 @@ from wfluid import (
     Functional,
     GaussianForce,
     Grid,
+    Instantaneous,
     ParticleMisfit,
     Timeline,
     WarpObjective,
@@ -59,6 +60,33 @@ def test_an_objective_keeps_its_numbers_when_the_arrays_it_was_made_of_change(ma
     assert functional.value(functional.start) == before
     with pytest.raises(ValueError, match="read-only"):
         functional.start[0] = 7.0
+
+
+def test_a_misfit_counts_every_particle_by_its_weight(make):
+    """1/2 sum of weight |x - destination|^2; where the particles rest that is known beforehand."""
+    off = np.array([(0.03, 0.04), (0.03, 0.04)])
+    misfit = ParticleMisfit(POINTS, POINTS + off, 0.125, [5.0, 0.5])
+    functional = make(misfit)
+    value, _ = functional.value_and_gradient(np.zeros(2))
+    assert value == pytest.approx(0.5 * (5.0 + 0.5) * 0.05**2, rel=1e-5)
+    by = np.array([(0.0, 0.01), (0.02, 0.0)])
+    value, slope = misfit.at(0.125, POINTS + by)
+    assert value == pytest.approx(0.5 * (5.0 * 0.0018 + 0.5 * 0.0017))
+    np.testing.assert_allclose(slope, [(-0.15, -0.15), (-0.005, -0.02)])
+
+
+@pytest.mark.parametrize("step", [8, 11, 5, 14])
+def test_a_blow_where_two_steps_meet_costs_its_effort_once(request, step):
+    """1/2 |V|^2 pi sigma^2 for a blow V, by a step: whichever way rounding moves the step's start."""
+    timeline = Timeline(17 / 48, fps=24, substeps=2)
+    blow = GaussianForce((0.5, 0.35), (0.3, -0.2), 0.06, Instantaneous(timeline.time_of(step)))
+    misfit, device = Effort(), request.config.getoption("--device")
+    functional = Functional(
+        Grid(48, 34, 1.0, 0.7), Fluid(), [blow], timeline, misfit, [Free("forces[0].vector")], device=device
+    )
+    value, _ = functional.value_and_gradient(functional.start)
+    expected = 0.5 * (0.3**2 + 0.2**2) * np.pi * 0.06**2 / timeline.dt
+    assert value == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,24 @@ def test_the_misfit_is_half_the_sum_of_squares_in_units_of_a_radius(led):
     assert longest(journey.misfits(places)) == pytest.approx(0.1)  # of the pin, at its keyframes
 
 
+def test_a_keyframe_counts_as_much_as_its_weight():
+    """phi = 1/2 sum of weight |q - K|^2 / r^2, and its gradient; misfits are not weighted."""
+    keyframes = [
+        ParticleKeyframe((0.3, 0.4), (0.5, 0.3), 0.5, weight=7.0),
+        ParticleKeyframe((0.3, 0.4), (0.6, 0.3), 1.0, weight=0.25),
+        ParticleKeyframe((0.3, 0.6), (0.5, 0.6), 1.0, weight=3.0),
+    ]
+    own = targets_of(keyframes, [], EXTENT, TIMELINE.end)
+    journey = WayMisfit([Way(one, 0.0) for one in own], np.array([one.point for one in own]), (0.5, 1.0), 0.1)
+    off = np.array([(0.03, 0.04), (0.0, -0.02)])
+    at_half, at_end = np.array([(0.5, 0.3), (0.4, 0.6)]) + off, np.array([(0.6, 0.3), (0.5, 0.6)]) + off
+    assert journey.at(0.5, at_half)[0] == pytest.approx(0.5 * 7.0 * 0.0025 / 0.01)
+    assert journey.at(1.0, at_end)[0] == pytest.approx(0.5 * (0.25 * 0.0025 + 3.0 * 0.0004) / 0.01)
+    np.testing.assert_allclose(journey.at(0.5, at_half)[1], [(21.0, 28.0), (0, 0)])
+    np.testing.assert_allclose(journey.at(1.0, at_end)[1], [(0.75, 1.0), (0.0, -6.0)])
+    assert longest(journey.misfits({1.0: at_end})) == pytest.approx(0.05)
+
+
 def test_the_misfit_guides_only_the_selected_points():
     paths = [((0.3, 0.4), {1.0: (0.5, 0.3)}), ((0.3, 0.6), {1.0: (0.5, 0.6)})]
     journey = journey_of(paths, (0.5, 1.0), guided=[False, True])

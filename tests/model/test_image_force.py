@@ -73,6 +73,17 @@ def test_vectors_are_read_with_zero_at_half_range():
     assert force.reach == pytest.approx(4 * np.hypot(0.5, 0.25))
 
 
+@pytest.mark.parametrize(("walls", "wraps"), [("periodic,free-slip", 0), ("free-slip,periodic", 1)])
+def test_vectors_meet_across_the_seam_of_their_own_axis(walls, wraps):
+    """A face has the mean of the centres beside it, across a seam of the last and the first; a wall has 0."""
+    vectors = np.random.default_rng(5).uniform(-1, 1, (18, 24, 2))
+    force = ImageForce(vectors, "vectors", 2.0).fields(GRID, Walls.parse(walls))[0]
+    for n, (got, centres) in enumerate(zip(force, np.moveaxis(vectors, 2, 0), strict=True)):
+        lines, values = (np.moveaxis(f, 1 - n, 0) for f in (got, centres))
+        np.testing.assert_allclose(lines[1:], values[1:] + values[:-1], atol=1e-6)
+        np.testing.assert_allclose(lines[0], (values[0] + values[-1]) * (n == wraps), atol=1e-6)
+
+
 def test_transparent_vectors_are_0_and_alpha_is_no_component():
     """A transparent place of a picture of vectors has no force; grey with alpha has one channel only."""
     clear = Picture(np.zeros((4, 4, 4), np.float32), 3, "uint8", srgb=False)

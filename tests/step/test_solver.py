@@ -9,10 +9,12 @@ from oracles import divergence, from_streamfunction, laplacian_2d, noise_velocit
 
 from wfluid.domain.envelopes import Constant, Instantaneous
 from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce, Growth
 from wfluid.model.painted import Painted
+from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver
 
 WALLS = ("free-slip", "no-slip", "periodic", "periodic,no-slip", "free-slip,periodic")
@@ -242,6 +244,54 @@ def test_impulse_does_not_depend_on_the_step(make_solver):
         gained = [f[:48, :60].sum() * cell for f in state.velocity]
         expected = np.array(force.vector) * (0.171 - 0.013) * 2 * np.pi * 0.05**2
         np.testing.assert_allclose(gained, expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("rate", [24, 30, 96])
+def test_a_blow_where_two_steps_meet_strikes_once(make_solver, rate):
+    """The momentum gained is vector * integral of the Gaussian, on whichever step's start the blow falls.
+
+    Rounding lets a step's start plus its length fall before the next one's start, or after it.
+    """
+    timeline = Timeline(1.0, fps=rate, substeps=1)
+    ends = [timeline.time_of(n) + timeline.dt for n in range(50)]
+    before, after = (
+        next(n for n in range(1, 50) if sign * (ends[n - 1] - timeline.time_of(n)) > 0) for sign in (-1, 1)
+    )
+    solver = make_solver(40, 32, walls="periodic", viscosity=0.001)
+    for step in (1, before, after):
+        blow = GaussianForce((0.5, 0.4), (0.2, -0.1), 0.06, Instantaneous(timeline.time_of(step)))
+        advance = steps_of(solver, timeline, [blow])
+        *_, (state, _) = march(solver.rest(), solver.rest(), range(step + 2), advance)
+        cell = solver.grid.hx * solver.grid.hy
+        gained = [f[:32, :40].sum() * cell for f in state.velocity]
+        np.testing.assert_allclose(gained, np.array(blow.vector) * 2 * np.pi * 0.06**2, rtol=1e-3)
+
+
+def test_points_and_map_turn_with_a_rigid_rotation_on_cells_of_any_shape(make_solver):
+    """One step of the midpoint rule, exact where v is linear: x + dt v(x + dt/2 v(x)), and back for the map.
+
+    v = w (-(y - c_y), x - c_x), in longer sides: cells twice as high as wide change nothing.
+    """
+    grid, w, dt = Grid(40, 20, 1.0, 1.0), 2.0, 0.1
+    solver = make_solver(40, 20, grid=grid, viscosity=0.0)
+    x, y = np.arange(41) * grid.hx, np.arange(21)[:, None] * grid.hy
+    u = np.broadcast_to(-w * (y[:-1] + grid.hy / 2 - 0.5), (20, 41))
+    v = np.broadcast_to(w * (x[:-1] + grid.hx / 2 - 0.5), (21, 40))
+    points = np.array([(0.62, 0.45), (0.5, 0.3), (0.41, 0.61)])
+    state, after = solver.rest(points), solver.rest(points)
+    solver.set_velocity(state, u, v)
+    solver.step(state, after, [], 0.0, dt)
+
+    def moved(places, dt):
+        """By a turn of w dt to second order: (1 - (w dt)^2 / 2) r + w dt times r turned."""
+        arm = places - 0.5
+        return 0.5 + (1 - (w * dt) ** 2 / 2) * arm + w * dt * np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+
+    np.testing.assert_allclose(after.points, moved(points, dt), atol=1e-6)
+    places = np.stack(np.broadcast_arrays(x[:-1] + grid.hx / 2, y[:-1] + grid.hy / 2), axis=-1)
+    inner = np.s_[5:15, 10:30]
+    sources = places + np.stack(after.displacement, axis=-1)
+    np.testing.assert_allclose(sources[inner], moved(places, -dt)[inner], atol=1e-6)
 
 
 @settings(max_examples=15, deadline=None)
