@@ -98,8 +98,10 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_value_is_that_of_the_rendered_frame(device, name):
-    """The pixels are those of a frame to the bit; differences, squares and weights round four times, sums
-    along a row of n positive numbers n times, all relative to what they are of.
+    """The pixels are those of a frame to the bit, before its alpha is clamped.
+
+    Differences, squares and weights round four times, sums along a row of n positive numbers n times, all
+    relative to what they are of.
     """
     case = {"size": (WIDTH, HEIGHT), "channels": 3, "wanted": 3, "alpha": None, "walls": "free-slip"}
     case |= {"filter": "cubic", "edge": "clamp", "weight": None} | CASES[name]
@@ -119,7 +121,7 @@ def test_the_value_is_that_of_the_rendered_frame(device, name):
         assert factor.std() > 0.05
     term = PictureMisfit(picture, target, 1.0, **how, weight=weight).term(stages, 3.0, slice(0, 0))
     term.measure(state)
-    frame = animation.look_up(picture).render(state.d_x, state.d_y).pixels
+    frame = animation.look_up(picture).interpolate(state.d_x, state.d_y).pixels
     squares = factor[..., None] * (frame.astype(np.float64) - target.pixels) ** 2
     area = animation.grid.width * animation.grid.height / (target.width * target.height)
     rounding = (target.width + 4) * float(np.finfo(np.float32).eps)

@@ -153,14 +153,19 @@ class LookUp:
         self._replay.launch()
 
     def render(self, d_x: wp.array, d_y: wp.array) -> Picture:
-        """The picture under the displacements d_x, d_y [cells], fields with ghosts."""
+        """The picture under the displacements d_x, d_y [cells], fields with ghosts; alpha is clamped."""
+        shown = self.interpolate(d_x, d_y)
+        if shown.alpha is not None:  # filters overshoot, which colours may
+            opacity = shown.pixels[..., shown.alpha]
+            np.clip(opacity, *self._opacities, out=opacity)
+        return shown
+
+    def interpolate(self, d_x: wp.array, d_y: wp.array) -> Picture:
+        """The same as the filter gives it, which is what `PictureMisfit` measures: alpha may overshoot."""
         self.launch(d_x, d_y)
         quads = [interior(read(out), self.layout) for out in self.shown]
         pixels = np.concatenate(quads, axis=2) if len(quads) > 1 else quads[0]
         pixels = np.array(pixels[..., : self.source.channels], dtype=np.float32, order="C")  # a copy
-        if self.source.alpha is not None:  # filters overshoot, which colours may
-            opacity = pixels[..., self.source.alpha]
-            np.clip(opacity, *self._opacities, out=opacity)
         return replace(self.picture, pixels=pixels, alpha=self.source.alpha)
 
     @cached_property
