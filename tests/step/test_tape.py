@@ -21,8 +21,9 @@ from wfluid import Buoyancy, Density, Fluid, GaussianForce, Grid, Growth, Painte
 from wfluid.fields.arrays import from_numpy, to_numpy
 from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
-from wfluid.step import advection, coefficients, densities, diffusion, feet, forcing, projection
+from wfluid.step import advection, coefficients, creeping, densities, diffusion, feet, forcing, projection
 from wfluid.step.forcing import Forcing
+from wfluid.step.kinds import step_for
 from wfluid.step.step import Step
 from wfluid.step.tape import record, recording
 
@@ -38,6 +39,7 @@ X, Y = centres(GRID)
 SMOOTH = 0.01 + 0.02 * np.exp(-((X - 0.5) ** 2 + (Y - 0.4) ** 2) / 0.05)
 FREEZE = frozen(np.where(disc(GRID, 0.7, 0.4, 0.1), 10.0, 0.0))
 SOLVED = {"diffusion_tolerance": 1e-12}
+CREEPING = {"inertia": False, "pressure_tolerance": 1e-12}
 
 CASES = {
     "constant": ({"viscosity": 0.01}, (PUSH, BUOYANCY, GROWTH)),
@@ -46,6 +48,9 @@ CASES = {
     "painted": ({"viscosity": SMOOTH, "walls": "no-slip"}, (PUSH,)),
     "frozen": ({"viscosity": SMOOTH, "freeze": FREEZE, "pressure_tolerance": 1e-12, **SOLVED}, (PUSH,)),
     "moves": ({"viscosity": SMOOTH, "viscosity_moves": True, **SOLVED}, (PUSH, BUOYANCY)),
+    "creeping": ({"viscosity": 0.01, **CREEPING}, (PUSH, BUOYANCY, GROWTH)),
+    "creeping, frozen": ({"viscosity": SMOOTH, "freeze": FREEZE, "walls": "no-slip", **CREEPING}, (PUSH,)),
+    "creeping, moves": ({"viscosity": SMOOTH, "viscosity_moves": True, **CREEPING}, (PUSH, GROWTH)),
 }
 """Fluids and forces. Each stage occurs in some case; each optional stage is missing in some other."""
 
@@ -55,7 +60,7 @@ class Recorded:
 
     def __init__(self, device, fluid, forces, points=((7.3, 5.1), (15.8, 12.4)), speed=1.0):
         self.fluid = Fluid(densities=[INK], **fluid)
-        self.step = Step(GRID, self.fluid, device)
+        self.step = step_for(GRID, self.fluid, device)
         self.step.allow_gradients()
         self.step.plan(DT, DT, self.step.update_coefficients)
         self.forcing = Forcing(forces, self.fluid, GRID, device, gradients=True)
@@ -146,7 +151,7 @@ class Recorded:
             changed[n] = e
             self.set(changed)
             right, _ = self.product(gradients, self.arrays(self.before))
-            errors[name] = abs(left - right) / size
+            errors[name] = abs(left - right) / size if size else abs(left)
         return errors
 
 
@@ -189,6 +194,9 @@ STAGES = {
     "pressure taken off": (projection.Projection, "_subtract_pressure_back", "moves"),
     "pressure added": (projection.Projection, "_add_pressure_back", "moves"),
     "viscosity carried": (coefficients.Coefficients, "_carry_back", "moves"),
+    "load of a creeping flow": (creeping.CreepingStep, "_load_back", "creeping"),
+    "creeping flow": (creeping.CreepingStep, "_answer_back", "creeping"),
+    "velocity handed over": (creeping.CreepingStep, "_hand_over_back", "creeping"),
 }
 """The transpose of each stage, and a step that has the stage."""
 
@@ -203,7 +211,7 @@ def test_a_stage_without_its_transpose_on_the_tape_fails_the_test_of_the_step(de
         if backward.func.__name__ != transpose or not isinstance(backward.func.__self__, kind):
             record(backward, reads, writes)
 
-    for module in (advection, coefficients, densities, diffusion, feet, forcing, projection):
+    for module in (advection, coefficients, creeping, densities, diffusion, feet, forcing, projection):
         monkeypatch.setattr(module, "record", recorded)
     errors = Recorded(device, *CASES[case]).errors()
     assert max(errors.values()) > 1e3 * TOLERANCE, errors
@@ -216,7 +224,9 @@ def test_every_stage_of_a_step_is_in_the_list_of_stages(device):
     for case in CASES.values():
         tape = Recorded(device, *case).record()
         found |= {(type(launch.func.__self__), launch.func.__name__) for launch in tape.launches}
-    assert found == {(kind, name) for kind, name, _ in STAGES.values()} | {(Step, "_clear_gradients")}
+    assert found == {(kind, name) for kind, name, _ in STAGES.values()} | {
+        (kind, "_clear_gradients") for kind in (Step, creeping.CreepingStep)
+    }
 
 
 @pytest.mark.float64
@@ -227,8 +237,12 @@ def test_recompute_restores_all_that_transposes_read(device, name):
     tape, step = recorded.record(), recorded.step
     tape.backward()
     expected = recorded.gradients()
-    between = [*step.feet.foot, *step.pushed, *step.advection.carried, *step.projection.without_pressure]
-    between += [step.projection.q, *step.diffusion.out]
+    between = [*step.feet.foot, *step.pushed]
+    if recorded.fluid.inertia:
+        between += [*step.advection.carried, *step.projection.without_pressure]
+        between += [step.projection.q, *step.diffusion.out]
+    else:
+        between += step.velocity
     for f in between:
         f.fill_(np.nan)
     if recorded.fluid.viscosity_moves:

@@ -64,6 +64,9 @@ MORPH_VISCOSITY = 0.03
 """Default viscosity of morphs [longer side^2/s]: high, so that the neighbourhood of a point moves with it and
 features keep their shape."""
 
+CREEPING_REACH = 0.3
+"""Distance over which a force is felt in a creeping fluid [longer side]."""
+
 VISCOSITY_LIMIT = 1e3
 """Largest viscosity that the solver is tested with [longer side^2/s]."""
 

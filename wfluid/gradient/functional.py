@@ -47,7 +47,7 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, LocalForce, flatten
 from wfluid.step.diffusion import SURE_TOLERANCE
 from wfluid.step.gaussians import gaussian_impulse_of
-from wfluid.step.step import Step
+from wfluid.step.kinds import step_for
 
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Largest tolerance of conjugate gradients, a relative residual."""
@@ -146,7 +146,7 @@ class Functional:
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
         cached = graphs.find(grid, timeline, fluid) if graphs else None
-        step = cached.step if cached else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
+        step = cached.step if cached else step_for(grid, fluid, open_device(device), JUMP_TOLERANCE)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[DeviceObjective]] = {}
         # in the graphs effort has weight 1, so that they can be reused: other weights are relative to it

@@ -31,6 +31,10 @@ class Fluid:
     """Whether a painted viscosity moves with the picture; otherwise it stays in place."""
     freeze: Freeze | None = None
     """Mask that holds parts of the picture in place."""
+    inertia: bool = True
+    """Whether the fluid keeps its velocity when forces end. Without inertia it creeps: the velocity answers
+    forces at once, as the Stokes flow that dissipates least, and only ratios of viscosities matter to how it
+    deforms the picture."""
     densities: Sequence[Density] = ()
     """Densities such as ink and smoke, with different names."""
     walls: Walls | str = field(default_factory=Walls)
@@ -69,6 +73,8 @@ class Fluid:
                 f"densities {', '.join(self.density_names)}: two have one name; give each its own"
             )
         check_word("scheme", self.scheme, SCHEMES)
+        if not self.inertia and self.scheme == "paper":
+            raise ValueError("scheme paper: its fluid has inertia; leave out the scheme or inertia=False")
         default = "jacobi" if self.scheme == "paper" else "multigrid"
         solver = default if self.solver is None else self.solver
         check_word("solver", solver, SOLVERS)
@@ -97,6 +103,6 @@ class Fluid:
 
     @property
     def separable(self) -> bool:
-        """Whether the components of the velocity diffuse independently: uniform, and no no-slip wall."""
+        """Whether the components of the velocity diffuse independently: uniform, inertia, no no-slip wall."""
         walls = self.boundary
-        return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
+        return self.uniform and self.inertia and Wall.NO_SLIP not in (walls.x, walls.y)

@@ -2,27 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import warp as wp
 
 from wfluid.fields.arrays import Scalars, Vector, copy, entries, fill, read, vector, zeros
 from wfluid.fields.sums import InnerProduct
+from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.real import Real
 from wfluid.kernels.cell.strips import alone, repeat_while, together
 from wfluid.kernels.solve import krylov
-from wfluid.solve.multigrid import Level
+
+
+class Equation(Protocol):
+    """A symmetric equation A x = b on a grid: what conjugate gradients need of it."""
+
+    layout: Layout
+    points: Sequence[Any]
+    """The components of x."""
+
+    def residual(self, b: Vector, x: Vector, out: Vector) -> None:
+        """out = b - A x. Reads the ghosts of x."""
+
+    def fill(self, x: Vector) -> None:
+        """Fill the ghosts of x."""
 
 
 class ConjugateGradients:
-    """Conjugate gradients on the equation of a level, with their vectors and numbers in device memory.
+    """Conjugate gradients on an equation, with their vectors and numbers in device memory.
 
     `precondition(r, z)` writes z = M r with M a symmetric approximate inverse, r and z with ghosts. `zero`
     holds a field of zeros per component.
     """
 
     def __init__(
-        self, level: Level, zero: Vector, precondition: Callable[[Vector, Vector], None], device: wp.Device
+        self, level: Equation, zero: Vector, precondition: Callable[[Vector, Vector], None], device: wp.Device
     ):
         self.level, self.zero, self.precondition, self.device = level, zero, precondition, device
         self.layout = level.layout
@@ -36,6 +52,11 @@ class ConjugateGradients:
     def iterations_run(self) -> int:
         """Number of iterations of the last solve."""
         return int(read(self._iterations)[0])
+
+    def error_left(self, tolerance: float) -> float:
+        """The error of the last solve to `tolerance`, in the same measure."""
+        rz, limit = (float(read(number)[0]) for number in (self._numbers.rz, self._numbers.limit))
+        return tolerance * math.sqrt(rz / limit) if limit > 0 else 0.0
 
     def solve(self, b: Vector, x: Vector, tolerance: float, most: int, scale: Vector | None) -> None:
         """x = A^-1 b, to the tolerance or after `most` iterations. Reads the ghosts of b, fills those of x.

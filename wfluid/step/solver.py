@@ -23,6 +23,7 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
 from wfluid.solve.system import Residual
 from wfluid.step.forcing import Forcing
+from wfluid.step.kinds import step_for
 from wfluid.step.step import Step
 
 REPLAYS_KEPT = 16
@@ -60,7 +61,7 @@ class Solver:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        self._step = Step(grid, fluid, device)
+        self._step = step_for(grid, fluid, device)
         self._last_step, self._prescribed = (0.0, 0.0), 0.0
         self._written: WeakKeyDictionary[State, tuple[float, float]] = WeakKeyDictionary()
         self._stepping = threading.Lock()
@@ -170,10 +171,9 @@ class Solver:
 
     def report(self) -> SolveReport:
         """Measure the true residuals and the divergence of the last step."""
-        step = self._step
-        pressure, divergence = step.projection.measure()
+        pressure, diffusion, divergence = self._step.measure()
         removed = self._last_forcing.removed if self._last_forcing else 0.0
-        return SolveReport(pressure, step.diffusion.measure(), divergence, self._prescribed, removed)
+        return SolveReport(pressure, diffusion, divergence, self._prescribed, removed)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt, which may be negative.

@@ -28,6 +28,7 @@ from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.program import ADJOINT
 from wfluid.kernels.cell.strips import alone
 from wfluid.model.fluid import Fluid
+from wfluid.solve.system import Residual
 from wfluid.step.advection import Advection
 from wfluid.step.coefficients import Coefficients
 from wfluid.step.densities import DensityTransport
@@ -78,6 +79,14 @@ class Step:
         self.feet = Feet(grid, fluid, device, *ghosts)
         self.advection = Advection(grid, fluid, device, *ghosts)
         self.coefficients = None if fluid.separable else Coefficients(grid, fluid, device)
+        self._add_solves(jump_tolerance)
+        self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
+        self.pushed = vector(self.layout, device, 2)
+        self._solves: tuple = ()
+
+    def _add_solves(self, jump_tolerance: float) -> None:
+        """Make the stages that solve: diffusion and projection."""
+        grid, fluid, device = self.grid, self.fluid, self.device
         self.diffusion = (
             CoupledDiffusion(fluid, self.coefficients, device, jump_tolerance)
             if self.coefficients
@@ -85,9 +94,6 @@ class Step:
         )
         drag = self.coefficients if fluid.freeze else None
         self.projection = Projection(grid, fluid, drag, device, self.velocity_ghosts, jump_tolerance)
-        self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
-        self.pushed = vector(self.layout, device, 2)
-        self._solves: tuple = ()
 
     pushed: Vector
     """The velocity after the forces of the last step that had any, with ghosts."""
@@ -160,9 +166,9 @@ class Step:
     @property
     def mu_bar(self) -> wp.array:
         """The gradient with respect to the painted viscosity, at centres; every backward step adds to it."""
-        if isinstance(self.diffusion, SeparateDiffusion):
-            return self.diffusion.mu_bar
-        return self.diffusion.coefficients.painted_mu.grad
+        if self.coefficients:
+            return self.coefficients.painted_mu.grad
+        return self.diffusion.mu_bar
 
     def take_fluid(self, fluid: Fluid) -> None:
         """Replace the fluid by one that differs in the values of its viscosity only, not in its type."""
@@ -172,6 +178,11 @@ class Step:
         if self.coefficients:
             self.coefficients.fluid = fluid
             self.coefficients.invalidate()
+
+    def measure(self) -> tuple[Residual, Residual, float]:
+        """Of the last step: the residuals of projection and diffusion, and the largest |div v - s| [1/s]."""
+        pressure, divergence = self.projection.measure()
+        return pressure, self.diffusion.measure(), divergence
 
     def helpers(self, alone: bool = False) -> ThreadTeam | None:
         """The threads that share the launches of a step with the calling one; None where that is no faster.
@@ -272,7 +283,7 @@ class Step:
         """The velocity after forces, with ghosts: the state's own arrays if no force acts on it."""
         if not forcing.adds_velocity:
             return state.u, state.v
-        forcing.push(state, self.pushed)
+        forcing.push((state.u, state.v), state.rho, self.pushed)
         return self.pushed
 
     def advect(self, velocity: Vector, foot: Vector) -> Vector:
