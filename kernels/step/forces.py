@@ -12,9 +12,16 @@ increases by the impulse of the force, which the host integrates over the step, 
 any dt. Beyond `CUT` radii g is below rounding and set to 0, so a force is computed only in the box of that
 size.
 
+On a periodic axis a Gaussian has an image one period further on, and so on: the field is the sum over all
+images. It is a product over the axes as well, so along each axis the profile g is the sum of the images'
+values, and r the mean of their distances weighted by these values. Where a single image counts, these are its
+own. Higher powers of r need an `excess`, the sum of r^a g over the images less r^a g of these two.
+
 Other forces are an impulse times a constant field on the faces, or times a density at centres. A weight is a
 factor at centres; a face takes the mean of its two.
 """
+
+import math
 
 import warp as wp
 from wfluid.kernels.cell.layout import index
@@ -36,26 +43,106 @@ def profile(
     radius: RowReal,
     start: Real,
     h: Real,
-    period: Real,
     # outputs
     r: Field,
     g: Field,
 ):
-    """r and g = exp(-r^2 / 2) of force j at position (i + start) h along one axis; r in radii.
+    """r and g = exp(-r^2 / 2) of force j at position (i + start) h along an axis between walls; r in radii.
 
-    centre, radius and h are in longer sides. `period` is the length of a periodic axis, where r is the
-    distance to the nearest image; 0 between walls.
+    centre, radius and h are in longer sides.
     """
     k = inside(k)
-    d = (Real(i) + start) * h - centre
-    if period > Real(0.0):
-        d = d - period * wp.round(d / period)
-    s = d / radius
+    s = ((Real(i) + start) * h - centre) / radius
     value = Real(0.0)
     if wp.abs(s) < CUT:
         value = wp.exp(Real(-0.5) * s * s)
     r[k] = s
     g[k] = value
+
+
+WIDE = wp.constant(Real(1.5))
+"""Radius [periods] from which the sum over the images is constant: its relative variation is exp(-44)."""
+
+
+SQRT_TWO_PI = wp.constant(Real(math.sqrt(2.0 * math.pi)))
+
+
+@wp.func
+def images_beside(radius: Real, period: Real):
+    """Number of images on each side of the nearest one within `CUT` radii of some point."""
+    return int(CUT * radius / period + Real(0.5))
+
+
+@cells
+def periodic_profile(
+    i: int,
+    j: int,
+    k: int,
+    centre: RowReal,
+    radius: RowReal,
+    start: Real,
+    h: Real,
+    period: Real,
+    # outputs
+    r: Field,
+    g: Field,
+    excess_2: Field,
+    excess_3: Field,
+    excess_4: Field,
+):
+    """The profile of force j at position (i + start) h along a periodic axis, and its excesses.
+
+    centre, radius, h and the axis's length `period` are in longer sides.
+    """
+    k = inside(k)
+    d = (Real(i) + start) * h - centre
+    d = d - period * wp.round(d / period)
+    s = d / radius
+    value = Real(0.0)
+    if wp.abs(s) < CUT:
+        value = wp.exp(Real(-0.5) * s * s)
+    sum1 = s * value
+    sum2 = s * sum1
+    sum3 = s * sum2
+    sum4 = s * sum3
+    several = int(0)
+    if radius < WIDE * period:
+        for m in range(2 * images_beside(radius, period)):
+            distance = period * Real(m // 2 + 1)
+            other = (d - distance) / radius
+            if m % 2 == 1:
+                other = (d + distance) / radius
+            if wp.abs(other) < CUT:
+                weight = wp.exp(Real(-0.5) * other * other)
+                value += weight
+                weight = weight * other
+                sum1 += weight
+                weight = weight * other
+                sum2 += weight
+                weight = weight * other
+                sum3 += weight
+                sum4 += weight * other
+                several = int(1)
+    else:  # moments of a Gaussian, times the number of images within a radius
+        value = radius / period * SQRT_TWO_PI
+        sum1 = Real(0.0)
+        sum2 = value
+        sum3 = Real(0.0)
+        sum4 = Real(3.0) * value
+        several = int(1)
+    x2 = Real(0.0)
+    x3 = Real(0.0)
+    x4 = Real(0.0)
+    if several == 1:
+        s = sum1 / value
+        x2 = sum2 - s * s * value
+        x3 = sum3 - s * s * s * value
+        x4 = sum4 - s * s * s * s * value
+    r[k] = s
+    g[k] = value
+    excess_2[k] = x2
+    excess_3[k] = x3
+    excess_4[k] = x4
 
 
 @wp.func

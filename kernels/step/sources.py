@@ -6,7 +6,7 @@ divergence s = div v makes the picture grow or shrink; with r = (x - c) / sigma
     s(x) = a (1 - |r|^2 / 2) exp(-|r|^2 / 2)
 
 has integral 0 over the plane, since it is the divergence of a (x - c) exp(-|r|^2 / 2) / 2. Both are
-sums of products of profiles along x and y (`forces`).
+sums of products of profiles along x and y, and sums over all images on periodic axes (`forces`).
 """
 
 from wfluid.kernels.cell.native import gather, inside
@@ -46,19 +46,28 @@ def swell(
     centre_y: Field,
     r_x: Field,
     r_y: Field,
+    excess_x: Field,
+    excess_y: Field,
     pitch_x: int,
     pitch_y: int,
     # outputs
     s: Field,
 ):
-    """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place."""
+    """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place.
+
+    The excesses are those of r^2 g on periodic axes; 0 between walls.
+    """
     k = inside(k)
     column = in_profile(n, i, pitch_x)
     row = in_profile(n, j, pitch_y)
     x = gather(r_x, column)
     y = gather(r_y, row)
-    g = gather(centre_x, column) * gather(centre_y, row)
-    s[k] = s[k] + gather(rate, n) * (Real(1.0) - Real(0.5) * (x * x + y * y)) * g
+    g_x = gather(centre_x, column)
+    g_y = gather(centre_y, row)
+    amount = gather(rate, n)
+    excess = gather(excess_x, column) * g_y + g_x * gather(excess_y, row)
+    s[k] = s[k] + amount * (Real(1.0) - Real(0.5) * (x * x + y * y)) * (g_x * g_y)
+    s[k] = s[k] - Real(0.5) * amount * excess
 
 
 @cells
