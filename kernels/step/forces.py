@@ -105,7 +105,7 @@ def periodic_profile(
     sum2 = s * sum1
     sum3 = s * sum2
     sum4 = s * sum3
-    several = int(0)
+    others = Real(0.0)
     if radius < WIDE * period:
         for m in range(2 * images_beside(radius, period)):
             distance = period * Real(m // 2 + 1)
@@ -122,18 +122,18 @@ def periodic_profile(
                 weight = weight * other
                 sum3 += weight
                 sum4 += weight * other
-                several = int(1)
+                others += Real(1.0)
     else:  # moments of a Gaussian, times the number of images within a radius
         value = radius / period * SQRT_TWO_PI
         sum1 = Real(0.0)
         sum2 = value
         sum3 = Real(0.0)
         sum4 = Real(3.0) * value
-        several = int(1)
+        others = Real(1.0)
     x2 = Real(0.0)
     x3 = Real(0.0)
     x4 = Real(0.0)
-    if several == 1:
+    if others > Real(0.0):
         s = sum1 / value
         x2 = sum2 - s * s * value
         x3 = sum3 - s * s * s * value
