@@ -1,14 +1,23 @@
 """The scheme "paper" is Stable Fluids as in Bonilla & Velho, section II, to rounding."""
 
+import re
+import warnings
+
 import numpy as np
 import pytest
 from stable_fluids import StableFluids
 from wfluid.kernels.cell.real import PRECISION
 
+from wfluid.animation.animation import Animation
+from wfluid.animation.simulation import PoorSolveWarning
 from wfluid.domain.envelopes import Constant
 from wfluid.domain.grid import Grid
+from wfluid.domain.timeline import Timeline
+from wfluid.gradient.functional import _check_solves
+from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.model.painted import Painted
+from wfluid.pictures.picture import Picture
 from wfluid.step.march import march
 
 GRID = Grid(26, 20, 1.0, 0.7)
@@ -98,3 +107,33 @@ def test_contrast_does_not_make_the_sweeps_diverge(make_solver):
     paint = np.where(np.random.default_rng(4).random((20, 26)) < 0.5, 1e-6, 100.0)
     state = after(make_solver, 20, viscosity=Painted(paint), sweeps=200)
     assert max(np.abs(f).max() for f in state.velocity) < DT * 20 * 10.0
+
+
+@pytest.mark.parametrize("painted", [False, True])
+def test_sweeps_that_have_not_converged_are_reported(device, painted):
+    """At mu = 0.1 fifty sweeps leave a third of the change, and the picture moves more than twice too far."""
+    mu, reached = Painted(np.full((3, 4), 0.1)) if painted else 0.1, []
+    for settings in ({}, {"solver": "multigrid"}):
+        fluid = Fluid(viscosity=mu, scheme="paper", **settings)
+        picture, size = Picture(np.zeros((6, 8, 3), np.float32)), {"cells": 128, "device": device.alias}
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            frames = list(Animation(picture, fluid, FORCES[:1], Timeline(0.5, 12), **size).frames())
+        reached.append(frames[-1].quality.displacement_max)
+        poor = [str(w.message) for w in caught if w.category is PoorSolveWarning]
+        if settings:
+            assert poor == []
+            continue
+        (said,) = poor
+        assert "scheme (--scheme) to standard" in said and "\n" not in said
+        left = [float(number) for number in re.findall(r"left (\S+) of the div.* and (\S+) of the", said)[0]]
+        solve = frames[1].solve
+        assert left == pytest.approx([solve.pressure.relative, solve.diffusion.relative], rel=0.05)
+        assert left[1] > 0.2
+    assert reached[0] > 2 * reached[1]
+
+
+def test_a_viscosity_that_moves_has_no_gradient_in_the_papers_scheme(device):
+    """The gradient with respect to viscosity is that of the stress, which this scheme does not solve."""
+    with pytest.raises(ValueError, match="set scheme to 'standard'"):
+        _check_solves(Fluid(viscosity=Painted(EDGE), viscosity_moves=True, scheme="paper"), free=False)
