@@ -113,6 +113,14 @@ def test_all_images_of_a_vortex_count_on_periodic_axes(make_solver, radius):
             assert seam < 0.5 * slope, (seam, slope)
 
 
+def test_images_that_add_up_beyond_the_limit_are_refused(make_solver):
+    """A push of 1e4 for 1 s adds 1e4; the images of a radius of 4 add up to 10 and 14 times that by axis."""
+    force = GaussianForce((0.5, 0.3), (1e4, 0.0), 4.0)
+    pushed(make_solver, [force], dt=1.0)
+    with pytest.raises(ValueError, match="the limit is"):
+        pushed(make_solver, [force], dt=1.0, walls="periodic")
+
+
 @pytest.mark.parametrize("walls", ["free-slip", "periodic", "periodic,free-slip"])
 def test_all_images_of_a_source_and_of_a_growth_count(make_solver, walls):
     """A source gives rate g, a growth rate (1 - r^2 / 2) g less its mean, summed over all images."""

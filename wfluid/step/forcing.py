@@ -199,6 +199,7 @@ class Forcing:
                     "window help"
                 )
             gained = max(impulse.gained, abs(impulse.swell) * impulse.radius)
+            gained *= _overlap(impulse.radius, self.grid, fluid.boundary.periodic)
             _check(f"the force at {impulse.center}", gained, t, until)
         prescribed = sum(abs(impulse.swell) for impulse in impulses.values())
         pressure_part = 0.0 if prescribed else pressure_part
@@ -345,6 +346,12 @@ def _check(what: str, gained: float, t: float, until: float) -> None:
             f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
             f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
         )
+
+
+def _overlap(radius: float, grid: Grid, periodic: tuple[bool, bool]) -> float:
+    """Upper bound of the sum of a Gaussian's images at one point, 1 where they do not overlap."""
+    sizes = zip((grid.width, grid.height), periodic, strict=True)
+    return math.prod(max(1.0, 3 * radius / size) for size, wraps in sizes if wraps)
 
 
 def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:
