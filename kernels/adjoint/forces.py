@@ -26,14 +26,6 @@ MOMENTS = wp.constant(15)
 """Number of pairs of powers a, b with a + b <= 4, in the order of a, then b."""
 
 
-@wp.func
-def has_excess(radius: Real, period: Real):
-    """Whether several images of a Gaussian of this radius count at some point of the axis."""
-    if period > Real(0.0):
-        return images_beside(radius, period) > 0
-    return False
-
-
 @adjoint_lines
 def row_moments(
     t: int,
@@ -86,7 +78,7 @@ def row_moments(
             sum2[0] += value * r * r
             sum3[0] += value * r * r * r
             sum4[0] += value * r * r * r * r
-        if has_excess(radius[n], period):
+        if images_beside(radius[n], period) > 0:
             for i in range(first, end):
                 value = f_bar[row + i]
                 sum2[0] += value * excess_2[table + i]
@@ -134,7 +126,7 @@ def moments(
                 out[m] = out[m] + value
                 value = value * r_y[y]
                 m = m + 1
-        if has_excess(radius[t], period):
+        if images_beside(radius[t], period) > 0:
             for a in range(ORDERS - 2):
                 m = entry_0 + a * ORDERS - a * (a - 1) // 2
                 out[m + 2] = out[m + 2] + sums[row + a] * excess_2[y]

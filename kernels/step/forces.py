@@ -26,7 +26,7 @@ import math
 import warp as wp
 from wfluid.kernels.cell.layout import index
 from wfluid.kernels.cell.native import entry, gather, inside
-from wfluid.kernels.cell.program import cells
+from wfluid.kernels.cell.program import cells, lines
 from wfluid.kernels.cell.real import Field, Real, RowReal, Uniform
 from wfluid.kernels.step.differences import mean_f
 
@@ -43,16 +43,21 @@ def profile(
     radius: RowReal,
     start: Real,
     h: Real,
+    period: Real,
     # outputs
     r: Field,
     g: Field,
 ):
-    """r and g = exp(-r^2 / 2) of force j at position (i + start) h along an axis between walls; r in radii.
+    """r and g = exp(-r^2 / 2) of force j at position (i + start) h along one axis; r in radii.
 
-    centre, radius and h are in longer sides.
+    centre, radius and h are in longer sides. `period` is the length of a periodic axis, where r is the
+    distance to the nearest image; 0 between walls.
     """
     k = inside(k)
-    s = ((Real(i) + start) * h - centre) / radius
+    d = (Real(i) + start) * h - centre
+    if period > Real(0.0):
+        d = d - period * wp.round(d / period)
+    s = d / radius
     value = Real(0.0)
     if wp.abs(s) < CUT:
         value = wp.exp(Real(-0.5) * s * s)
@@ -60,29 +65,40 @@ def profile(
     g[k] = value
 
 
+@wp.func
+def in_profile(n: int, i: int, pitch: int):
+    """Index of point i in the profile of force n."""
+    return entry(index(i, n, pitch))
+
+
 WIDE = wp.constant(Real(1.5))
 """Radius [periods] from which the sum over the images is constant: its relative variation is exp(-44)."""
-
 
 SQRT_TWO_PI = wp.constant(Real(math.sqrt(2.0 * math.pi)))
 
 
 @wp.func
 def images_beside(radius: Real, period: Real):
-    """Number of images on each side of the nearest one within `CUT` radii of some point."""
-    return int(CUT * radius / period + Real(0.5))
+    """Number of images on each side of the nearest one that are within `CUT` radii of some point.
+
+    `period` is the length of a periodic axis, 0 between walls.
+    """
+    count = int(0)  # noqa: UP018, RUF046 - Warp's way to declare a variable
+    if period > Real(0.0):
+        count = int(CUT * radius / period + Real(0.5))
+    return count
 
 
-@cells
-def periodic_profile(
-    i: int,
-    j: int,
-    k: int,
-    centre: RowReal,
-    radius: RowReal,
+@lines
+def add_images(
+    t: int,
+    centre: Field,
+    radius: Field,
     start: Real,
     h: Real,
     period: Real,
+    points: int,
+    pitch: int,
     # outputs
     r: Field,
     g: Field,
@@ -90,65 +106,48 @@ def periodic_profile(
     excess_3: Field,
     excess_4: Field,
 ):
-    """The profile of force j at position (i + start) h along a periodic axis, and its excesses.
+    """Add the other images of force t to its `profile` along a periodic axis, in place; find the excesses.
 
-    centre, radius, h and the axis's length `period` are in longer sides.
+    Where no other image counts nothing is written, the excesses neither.
     """
-    k = inside(k)
-    d = (Real(i) + start) * h - centre
-    d = d - period * wp.round(d / period)
-    s = d / radius
-    value = Real(0.0)
-    if wp.abs(s) < CUT:
-        value = wp.exp(Real(-0.5) * s * s)
-    sum1 = s * value
-    sum2 = s * sum1
-    sum3 = s * sum2
-    sum4 = s * sum3
-    others = Real(0.0)
-    if radius < WIDE * period:
-        for m in range(2 * images_beside(radius, period)):
-            distance = period * Real(m // 2 + 1)
-            other = (d - distance) / radius
-            if m % 2 == 1:
-                other = (d + distance) / radius
-            if wp.abs(other) < CUT:
-                weight = wp.exp(Real(-0.5) * other * other)
-                value += weight
-                weight = weight * other
-                sum1 += weight
-                weight = weight * other
-                sum2 += weight
-                weight = weight * other
-                sum3 += weight
-                sum4 += weight * other
-                others += Real(1.0)
-    else:  # moments of a Gaussian, times the number of images within a radius
-        value = radius / period * SQRT_TWO_PI
-        sum1 = Real(0.0)
-        sum2 = value
-        sum3 = Real(0.0)
-        sum4 = Real(3.0) * value
-        others = Real(1.0)
-    x2 = Real(0.0)
-    x3 = Real(0.0)
-    x4 = Real(0.0)
-    if others > Real(0.0):
-        s = sum1 / value
-        x2 = sum2 - s * s * value
-        x3 = sum3 - s * s * s * value
-        x4 = sum4 - s * s * s * s * value
-    r[k] = s
-    g[k] = value
-    excess_2[k] = x2
-    excess_3[k] = x3
-    excess_4[k] = x4
-
-
-@wp.func
-def in_profile(n: int, i: int, pitch: int):
-    """Index of point i in the profile of force n."""
-    return entry(index(i, n, pitch))
+    sigma = radius[t]
+    beside = images_beside(sigma, period)
+    if beside == 0:
+        return
+    for i in range(points):
+        k = in_profile(t, i, pitch)
+        value = Real(g[k])
+        sum1 = r[k] * value
+        sum2 = r[k] * sum1
+        sum3 = r[k] * sum2
+        sum4 = r[k] * sum3
+        alone = value
+        if sigma < WIDE * period:
+            d = (Real(i) + start) * h - centre[t]
+            nearest = wp.round(d / period)
+            for m in range(-beside, beside + 1):
+                s = (d - period * (nearest + Real(m))) / sigma
+                if m != 0 and wp.abs(s) < CUT:
+                    weight = wp.exp(Real(-0.5) * s * s)
+                    value += weight
+                    sum1 += s * weight
+                    sum2 += s * s * weight
+                    sum3 += s * s * s * weight
+                    sum4 += s * s * s * s * weight
+        else:  # moments of a Gaussian, times the number of images within a radius
+            value = sigma / period * SQRT_TWO_PI
+            sum1 = Real(0.0)
+            sum2 = value
+            sum3 = Real(0.0)
+            sum4 = Real(3.0) * value
+        mean = r[k]
+        if value != alone:
+            mean = sum1 / value
+        r[k] = mean
+        g[k] = value
+        excess_2[k] = sum2 - mean * mean * value
+        excess_3[k] = sum3 - mean * mean * mean * value
+        excess_4[k] = sum4 - mean * mean * mean * mean * value
 
 
 @cells

@@ -12,7 +12,7 @@ sums of products of profiles along x and y, and sums over all images on periodic
 from wfluid.kernels.cell.native import gather, inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
-from wfluid.kernels.step.forces import in_profile
+from wfluid.kernels.step.forces import images_beside, in_profile
 
 
 @cells
@@ -48,6 +48,9 @@ def swell(
     r_y: Field,
     excess_x: Field,
     excess_y: Field,
+    radius: Field,
+    period_x: Real,
+    period_y: Real,
     pitch_x: int,
     pitch_y: int,
     # outputs
@@ -55,7 +58,7 @@ def swell(
 ):
     """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place.
 
-    The excesses are those of r^2 g on periodic axes; 0 between walls.
+    The excesses are those of r^2 g along axes of lengths `period_x` and `period_y`, 0 between walls.
     """
     k = inside(k)
     column = in_profile(n, i, pitch_x)
@@ -65,9 +68,12 @@ def swell(
     g_x = gather(centre_x, column)
     g_y = gather(centre_y, row)
     amount = gather(rate, n)
-    excess = gather(excess_x, column) * g_y + g_x * gather(excess_y, row)
     s[k] = s[k] + amount * (Real(1.0) - Real(0.5) * (x * x + y * y)) * (g_x * g_y)
-    s[k] = s[k] - Real(0.5) * amount * excess
+    sigma = gather(radius, n)
+    if images_beside(sigma, period_x) > 0:
+        s[k] = s[k] - Real(0.5) * amount * gather(excess_x, column) * g_y
+    if images_beside(sigma, period_y) > 0:
+        s[k] = s[k] - Real(0.5) * amount * g_x * gather(excess_y, row)
 
 
 @cells

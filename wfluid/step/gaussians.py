@@ -114,7 +114,8 @@ class GaussianBatch:
         """Add the prescribed divergence to a field, in place: launches only."""
         x, y = self._profile()
         profiles = [x.g, y.g, x.r, y.r, x.excess[0], y.excess[0]]
-        inputs = [self._strengths[3], *profiles, self._x.layout.pitch, self._y.layout.pitch]
+        inputs = [self._strengths[3], *profiles, self._radius, self._x.period, self._y.period]
+        inputs += [self._x.layout.pitch, self._y.layout.pitch]
         sources.swell.launch(self.layout, self.device, inputs, [s], boxes=self._boxes)
 
     def pour(self, rho: wp.array) -> None:
@@ -189,12 +190,11 @@ class GaussianBatch:
         """Compute the profiles along both axes, at faces or at centres. Returns those at centres."""
         for axis, center in ((self._x, self._center_x), (self._y, self._center_y)):
             start, out = (0.0, axis.on_faces) if faces else (0.5, axis.at_centres)
-            inputs = [center, self._radius, start, axis.h]
+            inputs = [center, self._radius, start, axis.h, axis.period]
+            forces.profile.launch(axis.layout, self.device, inputs, [out.r, out.g])
             if axis.period:
-                inputs.append(axis.period)
-                forces.periodic_profile.launch(axis.layout, self.device, inputs, out.arrays)
-            else:
-                forces.profile.launch(axis.layout, self.device, inputs, [out.r, out.g])
+                inputs += [axis.points, axis.layout.pitch]
+                forces.add_images.launch(self.count, self.device, inputs, out.arrays)
         return self._x.at_centres, self._y.at_centres
 
 
