@@ -65,6 +65,8 @@ class Forcing:
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
         self._forces = tuple(forces)  # stored, so that no other object gets an id that is in the key
         walls = fluid.boundary
+        sizes = zip((grid.width, grid.height), walls.periodic, strict=True)
+        self._periods = [size for size, periodic in sizes if periodic]
         gaussian_forces, growths = _by_weight(self._forces)
         self._gaussian_forces = [
             GaussianForces(*group, grid, walls, device, gradients) for group in gaussian_forces
@@ -199,7 +201,8 @@ class Forcing:
                     "window help"
                 )
             gained = max(impulse.gained, abs(impulse.swell) * impulse.radius)
-            gained *= _overlap(impulse.radius, self.grid, fluid.boundary.periodic)
+            for period in self._periods:
+                gained *= max(1.0, 3 * impulse.radius / period)  # a bound of the sum of the images
             _check(f"the force at {impulse.center}", gained, t, until)
         prescribed = sum(abs(impulse.swell) for impulse in impulses.values())
         pressure_part = 0.0 if prescribed else pressure_part
@@ -346,12 +349,6 @@ def _check(what: str, gained: float, t: float, until: float) -> None:
             f"{what} would add a velocity of {gained:g} between {t:g} s and {until:g} s; "
             f"the limit is {FORCE_LIMIT * STEP_LIMIT:g}"
         )
-
-
-def _overlap(radius: float, grid: Grid, periodic: tuple[bool, bool]) -> float:
-    """Upper bound of the sum of a Gaussian's images at one point, 1 where they do not overlap."""
-    sizes = zip((grid.width, grid.height), periodic, strict=True)
-    return math.prod(max(1.0, 3 * radius / size) for size, wraps in sizes if wraps)
 
 
 def _uploaded(values: tuple[np.ndarray, np.ndarray], layout: Layout, device: wp.Device) -> Vector:
