@@ -210,7 +210,7 @@ def cells_of_traces(functional):
             if of_faces:
                 found += [np.floor((offset + np.roll(offset, 1, side)) / 2) for side in (1, 2)]
             else:
-                found.append(np.floor(offset + (0 if paper else 0.5)))
+                found += [np.floor(offset + shift) for shift in ((0,) if paper else (0, 0.5))]
     if fluid.viscosity_moves:
         found += [np.floor(lines(d[:steps])[:, *inner]) for d in (d_x, d_y)]
     return np.stack(found).astype(int)
@@ -375,7 +375,7 @@ CASES = {
     "the paper's scheme, painted, no-slip": Case(
         [PUSH, TWIRL],
         PARTICLES + MAP + 1e-4 * Effort(),
-        ["forces[*].vector", *SHAPES, "forces[1].spin", VELOCITY],
+        ["forces[*].vector", *SHAPES, Free("forces[1].spin", scale=30.0), VELOCITY],
         {
             "viscosity": paint(0.002, 0.03, 22),
             "freeze": Freeze(paint(0, 0.3, 23), 1e2),
