@@ -30,7 +30,7 @@ from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 
 RADII = (0.12, 0.05, 0.02)
-"""Radii of the forces at every point [longer side]. Where points are closer, the last is half their distance."""
+"""Radii of the forces at every point [longer side]; the last is at most half the distance of two points."""
 
 LEAST_RADIUS = 0.008
 """Least radius [longer side]."""

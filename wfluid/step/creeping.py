@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+import warp as wp
 
 from wfluid.domain.limits import CREEPING_REACH
 from wfluid.fields.arrays import Scalars, Vector, assign, copy, field, fill, vector, zeros
@@ -52,7 +53,7 @@ class CreepingStep(Step):
         grid, media, device = self.grid, self._media, self.device
         self.flow = StokesFlow(media.levels, (grid.width, grid.height), self.fluid.boundary, device)
         self._tolerance = min(self.fluid.pressure_tolerance, jump_tolerance)
-        self.velocity, self._still, self._load = (vector(self.layout, device, 2) for _ in range(3))
+        self._still, self._load, self._last = (vector(self.layout, device, 2) for _ in range(3))
         self._swelling, self._left = (vector(self.layout, device, 2) for _ in range(2))
         self._prescribed = field(self.layout, device)
         self._of_impulse = zeros(1, device)
@@ -60,10 +61,8 @@ class CreepingStep(Step):
         numbers = Scalars(device, one=1.0, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
         self._one, self._inverse_h = numbers.one, [numbers.inverse_hx, numbers.inverse_hy]
         self._inner = InnerProduct(self.layout, device, 2)
+        self.keeps_pressure = False
         self._scale_drags()
-
-    velocity: Vector
-    """The velocity of the last step, with ghosts."""
 
     @property
     def _media(self) -> Coefficients:
@@ -96,53 +95,49 @@ class CreepingStep(Step):
         """Write the state after the step to `state_out`: launches only; a tape that records takes them."""
         if self.fluid.viscosity_moves:
             self.update_coefficients(state_in)
-        velocity = self.answer(state_in, forcing)
-        points, out = (state_in.p_x, state_in.p_y), (state_out.p_x, state_out.p_y)
-        self.feet.carry_points(points, velocity, forcing, out)
-        foot = self.feet.trace(velocity, forcing)
-        self.carry_densities(state_in, foot, forcing, state_out)
-        self.carry_map(state_in, foot, state_out)
-        self._hand_over(velocity, (state_out.u, state_out.v))
+        velocity = state_out.u, state_out.v
+        self.answer(state_in, forcing, velocity)
+        self.transport(state_in, state_out, velocity, forcing)
         record(partial(self._clear_gradients, state_in), (), ())
 
-    def answer(self, state: State, forcing: Forcing) -> Vector:
-        """The velocity under the forces of a step, with ghosts."""
+    def answer(self, state: State, forcing: Forcing, velocity: Vector) -> None:
+        """velocity = the flow under the forces of a step, with ghosts."""
         load = self._load
         forcing.push(self._still, state.rho, self.pushed)
         with together():
             for f, to in zip(self.pushed, load, strict=True):
                 algebra.scale.launch(self.layout, self.device, [f, self._of_impulse], [to])
         self.flow.fill(load)
-        record(partial(self._load_back, load), self.pushed, load)
+        record(partial(self._load_back), self.pushed, load)
         sources = forcing if forcing.prescribes_divergence else None
         if sources is None:
-            self.flow.solve(load, self.velocity)
+            self.flow.solve(load, velocity)
         else:
             alone(lambda: fill(0.0, self._prescribed))
             sources.prescribe(self._prescribed)
             self.flow.swell(self._prescribed, self._swelling)
             self.flow.apply(load, self._swelling, self._left)
-            self.flow.solve(self._left, self.velocity)
+            self.flow.solve(self._left, velocity)
             with together():
-                for f, out in zip(self._swelling, self.velocity, strict=True):
+                for f, out in zip(self._swelling, velocity, strict=True):
                     algebra.add.launch(self.layout, self.device, [f], [out])
-            self.flow.fill(self.velocity)
-        record(partial(self._answer_back, sources), load, self.velocity)
-        return self.velocity
+            self.flow.fill(velocity)
+        alone(lambda: [copy(f, to) for f, to in zip(velocity, self._last, strict=True)])
+        record(partial(self._answer_back, velocity, sources), load, velocity)
 
-    def _load_back(self, load: Vector) -> None:
+    def _load_back(self) -> None:
         """Write the gradient of the velocity after forces."""
         with together():
-            for f, to in zip(bars(load), bars(self.pushed), strict=True):
+            for f, to in zip(bars(self._load), bars(self.pushed), strict=True):
                 algebra.scale.launch(self.layout, self.device, [f, self._of_impulse], [to])
 
-    def _answer_back(self, sources: Forcing | None) -> None:
-        """The gradient of the load, lambda; add mu_bar -= dt (strain of v) (strain of lambda).
+    def _answer_back(self, velocity: Vector, sources: Forcing | None) -> None:
+        """Write the gradient of the load, lambda; add mu_bar -= dt (strain of v) (strain of lambda).
 
         The solve is its own transpose. A prescribed divergence has the gradient -div beta (v_bar - A lambda),
         through the inverse of div beta grad.
         """
-        velocity_bar, lambda_ = bars(self.velocity), bars(self._load)
+        velocity_bar, lambda_ = bars(velocity), bars(self._load)
         self.flow.fill(velocity_bar)
         self.flow.solve(velocity_bar, lambda_)
         if sources:
@@ -150,27 +145,24 @@ class CreepingStep(Step):
             self.flow.swell_back(self._left, self._prescribed)
             sources.prescribe_adjoint(self._prescribed)
         if self.fluid.viscosity_moves:
-            inputs = [*self.velocity, *lambda_, self._media.dt, *self._inverse_h, self.layout.pitch]
+            inputs = [*velocity, *lambda_, self._media.dt, *self._inverse_h, self.layout.pitch]
             outputs = [self._media.levels[0].mu.grad]
             viscosity_adjoint.take_dissipation.launch(self.layout, self.device, inputs, outputs)
 
-    def _hand_over(self, velocity: Vector, out: Vector) -> None:
-        """out = velocity, ghosts included."""
-        for f, to in zip(velocity, out, strict=True):
-            alone(partial(copy, f, to))
-        record(partial(self._hand_over_back, velocity, out), velocity, out)
+    def recompute(self, state_in: State, state_out: State, forcing: Forcing) -> None:
+        """Compute again what the transposes of a step read besides the states: launches only.
 
-    def _hand_over_back(self, velocity: Vector, out: Vector) -> None:
-        """Add to the velocity's gradient."""
-        with together():
-            for f, to in zip(bars(out), bars(velocity), strict=True):
-                algebra.add.launch(self.layout, self.device, [f], [to])
-
-    def recompute(self, state: State, forcing: Forcing) -> None:
-        """Compute again what the transposes of the step from `state` read besides it: launches only."""
+        Nothing is solved: the velocity is that of the state after the step.
+        """
         if self.fluid.viscosity_moves:
-            self.update_coefficients(state)
-        self.feet.trace(self.answer(state, forcing), forcing)
+            self.update_coefficients(state_in)
+        forcing.push(self._still, state_in.rho, self.pushed)
+        self.feet.trace((state_out.u, state_out.v), forcing)
+
+    @property
+    def mu_bar(self) -> wp.array:
+        """The gradient with respect to the painted viscosity, at centres; every backward step adds to it."""
+        return self._media.painted_mu.grad
 
     def allow_gradients(self, of_viscosity: bool = False) -> None:
         """Allocate the arrays of the transposes, once, and load their kernels.
@@ -183,7 +175,7 @@ class CreepingStep(Step):
         load_kernels(self.device, ADJOINT)
         if self.pushed[0].grad is not None:
             return  # captured graphs know the arrays by their addresses
-        attach_gradients([*self.pushed, *self.velocity, *self._still, *self._load], self.layout, self.device)
+        attach_gradients([*self.pushed, *self._still, *self._load], self.layout, self.device)
         self._media.allow_gradients()
         self.feet.allow_gradients()
         self.advection.allow_gradients()
@@ -192,7 +184,7 @@ class CreepingStep(Step):
 
     def _clear_gradients(self, state: State) -> None:
         """Set to 0 the gradients to which several stages add; the backward pass of a step begins with it."""
-        alone(lambda: fill(0.0, *bars([*self.velocity, *self._still])))
+        alone(lambda: fill(0.0, *bars(self._still)))
         super()._clear_gradients(state)
 
     def take_fluid(self, fluid: Fluid) -> None:
@@ -201,6 +193,7 @@ class CreepingStep(Step):
             return
         self.fluid = self._media.fluid = fluid
         self._media.invalidate()
+        self.keeps_pressure = False
         self._scale_drags()
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
@@ -252,9 +245,10 @@ class CreepingStep(Step):
 
     def measure(self) -> tuple[Residual, Residual, float]:
         """Of the last step: the divergence left, beside the velocity's slopes; the flow's error; the largest
-        divergence left [1/s]. Prescribed divergence counts as left.
+        divergence left [1/s]. Without what growths prescribe.
         """
-        divergence = self.flow.divergence_of(self.velocity)
-        slopes = self._inner.norm(self.velocity) / min(self.grid.hx, self.grid.hy)
+        velocity = self._last
+        divergence = self.flow.divergence_of(velocity)
+        slopes = self._inner.norm(velocity) / min(self.grid.hx, self.grid.hy)
         left = Residual("projection", 1, self._inner.norm((divergence,)), slopes)
         return left, self.flow.measure(), self._inner.largest(divergence)

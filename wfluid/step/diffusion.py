@@ -169,12 +169,18 @@ class SeparateDiffusion:
                 viscosity_adjoint.add_diffused.launch(self.layout, self.device, inputs, [self.mu_bar])
 
     def measure(self) -> Residual:
-        """The residual of the last solve for u, relative to the change it made."""
-        return self.components[0].measure()
+        """The residual of the last solve for u, relative to the change it made; for v where u is at rest."""
+        of_u, of_v = self.components
+        residual = of_u.measure()
+        return residual if residual.norm_b else of_v.measure()
 
 
 class CoupledDiffusion:
-    """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
+    """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together.
+
+    With scheme "paper" it is (1 + dt alpha) f' - dt div (mu grad f') = f for each component f, which for
+    constant mu is the equation of `SeparateDiffusion`.
+    """
 
     def __init__(
         self, fluid: Fluid, coefficients: Coefficients, device: wp.Device, jump_tolerance: float = 1.0
@@ -183,7 +189,10 @@ class CoupledDiffusion:
         self.fluid, self.coefficients, self.device = fluid, coefficients, device
         self.layout = coefficients.levels[0].layout
         size, walls = coefficients.size, fluid.boundary
-        self._levels = [ViscousStress(level, size, walls, device) for level in coefficients.levels]
+        paper = fluid.scheme == "paper"
+        self._levels = [
+            ViscousStress(level, size, walls, device, coupled=not paper) for level in coefficients.levels
+        ]
         self.system = LinearSystem(self._levels, device, STRESS_INTERVAL)
         self.method = SolveMethod("none", 0)
         self.out, self._scaled, self._b, self._x = (vector(self.layout, device, 2) for _ in range(4))
@@ -200,9 +209,10 @@ class CoupledDiffusion:
         """
         stiffness, tolerance = self.coefficients.stiffness(dt), self.fluid.diffusion_tolerance
         self._norm = stiffness.greatest
+        paper, jacobi = self.fluid.scheme == "paper", self.fluid.solver == "jacobi"
         for depth, level in enumerate(self._levels):
-            level.set_step(dt, 0.0 if depth else stiffness.least)
-        if self.fluid.solver == "jacobi":
+            level.set_step(dt, 0.0 if depth else stiffness.least, plain=paper and jacobi)
+        if jacobi:
             self.method = SolveMethod("jacobi", self.fluid.sweeps)
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.method = sweeps
