@@ -77,9 +77,9 @@ PICTURES = (
 """Ending, type, channels and attributes of the good files; formats that cannot be written are left out."""
 
 TEXTS = {
-    "comma.csv": "from x,from y,to x,to y,time\n20,5,30,8,1\n10,12.5,14,-3e1,\n".encode(),
+    "comma.csv": b"from x,from y,to x,to y,time\n20,5,30,8,1\n10,12.5,14,-3e1,\n",
     "semicolon.csv": "sep=;\n20,5;20,5;30;8\n1;2;3;4\n".encode("utf-16"),
-    "tab.csv": "# points\n20\t5\t30\t8\n".encode(),
+    "tab.csv": b"# points\n20\t5\t30\t8\n",
     "scene.toml": b'picture = "a.png"\n[frames]\nfps = 10\n[[forces]]\nat = [1, 2]\nradius = 0.1\n',
 }
 
