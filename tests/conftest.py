@@ -15,6 +15,7 @@ DOUBLE = os.environ.get("WFLUID_PRECISION") == "float64"
 def pytest_addoption(parser):
     parser.addoption("--device", default="cpu", help="device the tests run on: cpu, cuda, …")
     parser.addoption("--long", action="store_true", help="run the tests marked long too")
+    parser.addoption("--fuzz", type=int, default=500, help="number of mutated files that are read")
 
 
 def pytest_collection_modifyitems(config, items):
