@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -15,12 +15,16 @@ from wfluid.fields.arrays import copy
 from wfluid.fields.state import State
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
-from wfluid.solve.system import conjugate_gradients
+from wfluid.step.diffusion import ERROR_TIME
 from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver, SolveReport
 
 POOR_RESIDUAL = 0.02
 """Relative residual of the projection above which a frame warns."""
+
+LOSS_DOUBT = 3.0
+"""Factor within which the estimated loss of the map is right: a frame warns above that times
+`Fluid.diffusion_loss`."""
 
 
 class PoorSolveWarning(UserWarning):
@@ -66,12 +70,15 @@ class Simulation:
         def advance(state_in: State, state_out: State, step: int) -> None:
             (take if step else take_first)(state_in, state_out, step)
 
+        errors = 0.0  # of the velocity, summed over the steps [longer side/s]
         steps = march(self.now, self.spare, range(frames * per_frame), advance)
         for index in range(1, frames + 1):
             for self.now, self.spare in islice(steps, per_frame):
                 pass  # to the next frame
-            solve = self.solver.report()
-            self._warned = _judge(solve, self.solver.fluid, index, self._warned)
+            solve, t = self.solver.report(), self.timeline.time_of(index * per_frame)
+            errors += per_frame * solve.diffusion.error
+            solve = replace(solve, map_loss=min(ERROR_TIME, t / 2) * errors)
+            self._warned = _judge(solve, self.solver.fluid, index, t, self._warned)
             yield SimulatedFrame(self.now, solve)
 
     def untouch(self) -> None:
@@ -81,7 +88,7 @@ class Simulation:
             copy(untouched, array)
 
 
-def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
+def _judge(solve: SolveReport, fluid: Fluid, index: int, t: float, warned: bool) -> bool:
     """Stop where the fluid is not finite; warn once of a solve with a large residual.
 
     The paper's own scheme gives no warning: few Jacobi sweeps are part of it.
@@ -93,13 +100,13 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
         )
     if warned or fluid.scheme == "paper":
         return warned
-    text = _poor(solve, fluid)
+    text = _poor(solve, fluid, t)
     if text:
         warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
     return bool(text)
 
 
-def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
+def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
     """A warning of a large residual, with the remedy; None if there is none."""
     pressure, diffusion = solve.pressure, solve.diffusion
     if pressure.relative > POOR_RESIDUAL:
@@ -110,11 +117,17 @@ def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
         if pressure.method == "jacobi":
             return f"{left} sweeps; set solver (--solver) to multigrid"
         return f"{left} iterations; soften the edges of the freeze mask"
-    most = conjugate_gradients(fluid.diffusion_tolerance).iterations
-    if diffusion.method == "conjugate gradients" and diffusion.iterations == most:
+    if diffusion.unfinished:
         return (
             f"the diffusion left {diffusion.relative:.1e} of its change after "
             f"{diffusion.iterations} iterations; "
             "lower the contrast of the viscosity, soften its edges, or use more substeps"
         )
+    excess = solve.map_loss / (fluid.diffusion_loss * max(1.0, t))
+    if excess > LOSS_DOUBT:
+        left = f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side"
+        if diffusion.method == "jacobi":
+            return f"{left}; set solver (--solver) to multigrid"
+        less = fluid.diffusion_tolerance / excess
+        return f"{left}; set diffusion_tolerance (--diffusion-tolerance) to {less:.1e}"
     return None

@@ -3,16 +3,24 @@
 Both solve A d = v - A v0 for the change d = v' - v0, where v0 = v / (1 + dt alpha) is the velocity after drag
 alone. So uniform motion stays exact, and the solver's tolerance is relative to the change. With a symmetric
 solver M the stage is v' = v0 + M (v - A v0), and its transpose has the same factors in opposite order.
+
+What a solve leaves of the velocity's error stays with the flow, and the next step's adds to it. So the error
+of one step is judged by what the errors of all steps make the map lose: `Fluid.diffusion_loss`. Beside stiff
+paint a residual does not show that: there it is a rounding of large forces within the paint, while the
+motion of the patch as a body is still wrong.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from functools import partial
 
 import warp as wp
 
 from wfluid.domain.grid import Grid
-from wfluid.fields.arrays import Scalars, Vector, copy, field, fill, vector, zeros
+from wfluid.domain.limits import DIFFUSION_LOSS
+from wfluid.fields.arrays import Scalars, Vector, assign, copy, field, fill, vector, zeros
 from wfluid.kernels.adjoint import viscosity as viscosity_adjoint
 from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.strips import alone, together
@@ -20,13 +28,32 @@ from wfluid.kernels.solve import algebra
 from wfluid.model.fluid import Fluid
 from wfluid.solve.multigrid import Location, hierarchy
 from wfluid.solve.operators import FIVE_POINT_INTERVAL, STRESS_INTERVAL, FivePoint, ViscousStress
-from wfluid.solve.system import JUMP_LIMIT, LinearSystem, Residual, SolveMethod, conjugate_gradients
-from wfluid.step.coefficients import Coefficients
+from wfluid.solve.system import (
+    CONTRAST_LIMIT,
+    JUMP_LIMIT,
+    LinearSystem,
+    Residual,
+    SolveMethod,
+    conjugate_gradients,
+)
+from wfluid.step.coefficients import Coefficients, Stiffness
 from wfluid.step.tape import attach_gradients, bars, record
 
 SURE_TOLERANCE = 1e-4
 """At this tolerance and below, the coupled equation is solved by conjugate gradients, which check their
 residual. Above it, a number of multigrid cycles runs that was measured to suffice."""
+
+ERROR_TIME = 0.5
+"""Time for which an error of the velocity moves the map [s]: viscosity and walls end it. Where all errors
+stay, it is the mean of a run of 1 s."""
+
+SPREAD = 3.0
+"""Error of the velocity in and around stiff paint, relative to its root mean square over all cells."""
+
+
+def tolerance_of(fluid: Fluid) -> float:
+    """The relative tolerance of sweeps and cycles, in proportion to a lower `diffusion_loss`."""
+    return max(1e-14, fluid.diffusion_tolerance * min(1.0, fluid.diffusion_loss / DIFFUSION_LOSS))
 
 
 class ScalarDiffusion:
@@ -69,7 +96,7 @@ class ScalarDiffusion:
     def _choose(self) -> SolveMethod:
         if self.fluid.solver == "jacobi":
             return SolveMethod("jacobi", self.fluid.sweeps)
-        top, tolerance = self._levels[0], self.fluid.diffusion_tolerance
+        top, tolerance = self._levels[0], tolerance_of(self.fluid)
         sweeps = self.system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
         return sweeps or self.system.plan_cycles(tolerance)
 
@@ -107,7 +134,8 @@ class ScalarDiffusion:
         """The residual of the last `diffuse`, relative to the change it made."""
         if not self.method.iterations:
             return Residual("none", 0, 0.0, 0.0)
-        return self.system.measure(self.method, self._b, self._x)
+        residual = self.system.measure(self.method, self._b, self._x)
+        return _with_error(residual, self.system, self.method)
 
 
 class SeparateDiffusion:
@@ -169,8 +197,9 @@ class SeparateDiffusion:
                 viscosity_adjoint.add_diffused.launch(self.layout, self.device, inputs, [self.mu_bar])
 
     def measure(self) -> Residual:
-        """The residual of the last solve for u, relative to the change it made."""
-        return self.components[0].measure()
+        """The residual of the last solve for u, relative to the change it made; the error of u and v."""
+        u, v = (component.measure() for component in self.components)
+        return replace(u, error=math.hypot(u.error, v.error))
 
 
 class CoupledDiffusion:
@@ -189,6 +218,7 @@ class CoupledDiffusion:
         self.out, self._scaled, self._b, self._x = (vector(self.layout, device, 2) for _ in range(4))
         numbers = {"inverse_hx": 1 / coefficients.grid.hx, "inverse_hy": 1 / coefficients.grid.hy}
         self._numbers = Scalars(device, one=1.0, **numbers)
+        self._error = zeros(1, device)
 
     out: Vector
     """The result of the last `diffuse`, with ghosts."""
@@ -198,7 +228,8 @@ class CoupledDiffusion:
 
         `update_coefficients` must run before the next `diffuse`: `Step.plan` sees to that.
         """
-        stiffness, tolerance = self.coefficients.stiffness(dt), self.fluid.diffusion_tolerance
+        stiffness, tolerance = self.coefficients.stiffness(dt), tolerance_of(self.fluid)
+        self._allow(dt)
         self._norm = stiffness.greatest
         for depth, level in enumerate(self._levels):
             level.set_step(dt, 0.0 if depth else stiffness.least)
@@ -206,12 +237,18 @@ class CoupledDiffusion:
             self.method = SolveMethod("jacobi", self.fluid.sweeps)
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
             self.method = sweeps
-        elif stiffness.jump > JUMP_LIMIT or tolerance <= SURE_TOLERANCE:
+        elif _stiff(stiffness) or tolerance <= SURE_TOLERANCE:
             self.method = conjugate_gradients(min(tolerance, self._jump_tolerance))
         else:
             self.method = self.system.plan_cycles(tolerance)
         self.system.prepare(self.method)
         return self.method
+
+    def _allow(self, dt: float) -> None:
+        """Set the error of a step of dt that costs the map at most `Fluid.diffusion_loss` in a second."""
+        cells = self.layout.nx * self.layout.ny
+        error = self.fluid.diffusion_loss * dt / (ERROR_TIME * SPREAD)
+        assign([cells * error**2], self._error)
 
     def update_coefficients(self) -> None:
         """Bring the solver up to date with the coefficients and the step: launches only."""
@@ -232,7 +269,7 @@ class CoupledDiffusion:
                 algebra.multiply.launch(self.layout, self.device, [f, beta], [to])
         top.fill(dragged)
         top.residual(velocity, dragged, self._b)
-        self.system.solve(self.method, self._b, self._x, scale=velocity)
+        self.system.solve(self.method, self._b, self._x, scale=velocity, error=self._error)
         with together():
             for f, change, out in zip(dragged, self._x, self.out, strict=True):
                 algebra.add_scaled.launch(self.layout, self.device, [f, change, self._numbers.one], [out])
@@ -270,4 +307,16 @@ class CoupledDiffusion:
         """The residual of the last `diffuse`, relative to the change it made."""
         if not self.method.iterations:
             return Residual("none", 0, 0.0, 0.0)
-        return self.system.measure(self.method, self._b, self._x, self._norm)
+        residual = self.system.measure(self.method, self._b, self._x, self._norm)
+        return _with_error(residual, self.system, self.method)
+
+
+def _stiff(stiffness: Stiffness) -> bool:
+    """Whether the coefficients differ by more than cycles can solve for."""
+    return stiffness.jump > JUMP_LIMIT or stiffness.contrast > CONTRAST_LIMIT
+
+
+def _with_error(residual: Residual, system: LinearSystem, method: SolveMethod) -> Residual:
+    """The residual of the solve that was just measured, with its estimated error."""
+    layout, spread = system.levels[0].layout, SPREAD if method.name == "conjugate gradients" else 1.0
+    return replace(residual, error=spread * system.error(method) / math.sqrt(layout.nx * layout.ny))
