@@ -65,10 +65,10 @@ MEDIA = {
 
 @pytest.mark.parametrize("name", MEDIA)
 def test_the_map_loses_no_more_than_is_allowed_and_the_estimate_is_right(device, name):
-    """The estimate to a factor of 4 below, 8 above: it knows no directions and no places."""
+    """The estimate knows no directions and no places, so it is right to a factor of 4."""
     off, estimate = lost(device, 48, 48, MEDIA[name](48))
     assert off < DIFFUSION_LOSS
-    assert off / 4 < estimate < max(8 * off, DIFFUSION_LOSS)
+    assert off / 4 < estimate < 4 * off
 
 
 @pytest.mark.long
@@ -76,8 +76,8 @@ def test_the_map_loses_no_more_than_is_allowed_and_the_estimate_is_right(device,
 @pytest.mark.parametrize("name", ["disc", "three discs", "stripes", "frozen"])
 def test_it_loses_no_more_on_a_fine_grid_or_with_other_steps(device, name, fps):
     off, estimate = lost(device, 128, fps, MEDIA[name](128))
-    assert off < 1.1 * DIFFUSION_LOSS
-    assert off / 4 < estimate < 8 * off
+    assert off < DIFFUSION_LOSS
+    assert off / 4 < estimate < DIFFUSION_LOSS / 2
 
 
 @pytest.mark.parametrize("name", ["disc", "contrast 5", "number"])

@@ -15,16 +15,12 @@ from wfluid.fields.arrays import copy
 from wfluid.fields.state import State
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
-from wfluid.step.diffusion import ERROR_TIME
+from wfluid.step.diffusion import ERROR_TIME, MARGIN
 from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver, SolveReport
 
 POOR_RESIDUAL = 0.02
 """Relative residual of the projection above which a frame warns."""
-
-LOSS_DOUBT = 3.0
-"""Factor within which the estimated loss of the map is right: a frame warns above that times
-`Fluid.diffusion_loss`."""
 
 
 class PoorSolveWarning(UserWarning):
@@ -124,7 +120,7 @@ def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
             "lower the contrast of the viscosity, soften its edges, or use more substeps"
         )
     excess = solve.map_loss / (fluid.diffusion_loss * max(1.0, t))
-    if excess > LOSS_DOUBT:
+    if excess > MARGIN:
         left = f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side"
         if diffusion.method == "jacobi":
             return f"{left}; set solver (--solver) to multigrid"

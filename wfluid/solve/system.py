@@ -70,7 +70,8 @@ class Residual:
     norm_ax: float = 0.0
     """||A|| ||x||, an upper bound of ||A x||."""
     error: float = 0.0
-    """Of a diffusion, the estimated error of the velocity where it is large [longer side/s]."""
+    """Of a diffusion, the estimated error of the velocity: root mean square over the cells [longer
+    side/s]."""
     unfinished: bool = False
     """Whether conjugate gradients stopped at the most iterations."""
 

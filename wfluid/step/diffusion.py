@@ -47,8 +47,9 @@ ERROR_TIME = 0.5
 """Time for which an error of the velocity moves the map [s]: viscosity and walls end it. Where all errors
 stay, it is the mean of a run of 1 s."""
 
-SPREAD = 3.0
-"""Error of the velocity in and around stiff paint, relative to its root mean square over all cells."""
+MARGIN = 3.0
+"""Factor within which the estimated loss of the map is right: conjugate gradients stop as far below
+`Fluid.diffusion_loss`."""
 
 
 def tolerance_of(fluid: Fluid) -> float:
@@ -247,7 +248,7 @@ class CoupledDiffusion:
     def _allow(self, dt: float) -> None:
         """Set the error of a step of dt that costs the map at most `Fluid.diffusion_loss` in a second."""
         cells = self.layout.nx * self.layout.ny
-        error = self.fluid.diffusion_loss * dt / (ERROR_TIME * SPREAD)
+        error = self.fluid.diffusion_loss * dt / (ERROR_TIME * MARGIN)
         assign([cells * error**2], self._error)
 
     def update_coefficients(self) -> None:
@@ -318,5 +319,5 @@ def _stiff(stiffness: Stiffness) -> bool:
 
 def _with_error(residual: Residual, system: LinearSystem, method: SolveMethod) -> Residual:
     """The residual of the solve that was just measured, with its estimated error."""
-    layout, spread = system.levels[0].layout, SPREAD if method.name == "conjugate gradients" else 1.0
-    return replace(residual, error=spread * system.error(method) / math.sqrt(layout.nx * layout.ny))
+    layout = system.levels[0].layout
+    return replace(residual, error=system.error(method) / math.sqrt(layout.nx * layout.ny))
