@@ -74,7 +74,7 @@ class ScalarDiffusion:
         self._levels = [
             FivePoint(nx, ny, size, points, device) for nx, ny in hierarchy(grid.nx, grid.ny, size)
         ]
-        self.system = LinearSystem(self._levels, device, FIVE_POINT_INTERVAL)
+        self.system = LinearSystem(self._levels, device, FIVE_POINT_INTERVAL, smooth_exact=conserved)
         self.method = SolveMethod("none", 0)
         self._b, self._x = (vector(self.layout, device, 1) for _ in range(2))
         self._numbers = Scalars(device, "mean", one=1.0)
@@ -132,11 +132,15 @@ class ScalarDiffusion:
         algebra.subtract_number.launch(self.layout, self.device, [self._numbers.mean], [f])
 
     def measure(self) -> Residual:
-        """The residual of the last `diffuse`, relative to the change it made."""
+        """The residual of the last `diffuse`, relative to the change it made, with the error."""
         if not self.method.iterations:
             return Residual("none", 0, 0.0, 0.0)
         residual = self.system.measure(self.method, self._b, self._x)
-        return _with_error(residual, self.system, self.method)
+        return replace(residual, error=self.error())
+
+    def error(self) -> float:
+        """The estimated error of the last `diffuse`: root mean square over the cells."""
+        return _mean_error(self.system, self.method, self._b, self._x) if self.method.iterations else 0.0
 
 
 class SeparateDiffusion:
@@ -199,8 +203,9 @@ class SeparateDiffusion:
 
     def measure(self) -> Residual:
         """The residual of the last solve for u, relative to the change it made; the error of u and v."""
-        u, v = (component.measure() for component in self.components)
-        return replace(u, error=math.hypot(u.error, v.error))
+        u, v = self.components
+        residual = u.measure()
+        return replace(residual, error=math.hypot(residual.error, v.error()))
 
 
 class CoupledDiffusion:
@@ -309,7 +314,7 @@ class CoupledDiffusion:
         if not self.method.iterations:
             return Residual("none", 0, 0.0, 0.0)
         residual = self.system.measure(self.method, self._b, self._x, self._norm)
-        return _with_error(residual, self.system, self.method)
+        return replace(residual, error=_mean_error(self.system, self.method, self._b, self._x))
 
 
 def _stiff(stiffness: Stiffness) -> bool:
@@ -317,7 +322,7 @@ def _stiff(stiffness: Stiffness) -> bool:
     return stiffness.jump > JUMP_LIMIT or stiffness.contrast > CONTRAST_LIMIT
 
 
-def _with_error(residual: Residual, system: LinearSystem, method: SolveMethod) -> Residual:
-    """The residual of the solve that was just measured, with its estimated error."""
+def _mean_error(system: LinearSystem, method: SolveMethod, b: Vector, x: Vector) -> float:
+    """The estimated error of a solve: root mean square over the cells."""
     layout = system.levels[0].layout
-    return replace(residual, error=system.error(method) / math.sqrt(layout.nx * layout.ny))
+    return system.error(method, b, x) / math.sqrt(layout.nx * layout.ny)
