@@ -52,9 +52,12 @@ MARGIN = 3.0
 `Fluid.diffusion_loss`."""
 
 
-def tolerance_of(fluid: Fluid) -> float:
-    """The relative tolerance of sweeps and cycles, in proportion to a lower `diffusion_loss`."""
-    return max(1e-14, fluid.diffusion_tolerance * min(1.0, fluid.diffusion_loss / DIFFUSION_LOSS))
+def tolerance_of(fluid: Fluid, fixed_tolerance: float) -> float:
+    """The relative tolerance of sweeps and cycles: in proportion to a lower `diffusion_loss`, and at most
+    `fixed_tolerance`.
+    """
+    tolerance = fluid.diffusion_tolerance * min(1.0, fluid.diffusion_loss / DIFFUSION_LOSS)
+    return max(1e-14, min(tolerance, fixed_tolerance))
 
 
 class ScalarDiffusion:
@@ -66,8 +69,15 @@ class ScalarDiffusion:
     """
 
     def __init__(
-        self, grid: Grid, fluid: Fluid, points: Location, device: wp.Device, conserved: bool = False
+        self,
+        grid: Grid,
+        fluid: Fluid,
+        points: Location,
+        device: wp.Device,
+        conserved: bool = False,
+        fixed_tolerance: float = 1.0,
     ):
+        self._fixed_tolerance = fixed_tolerance
         self.fluid, self.device, self.layout = fluid, device, Layout(grid.nx, grid.ny)
         self._conserved = conserved
         size = (grid.width, grid.height)
@@ -97,7 +107,7 @@ class ScalarDiffusion:
     def _choose(self) -> SolveMethod:
         if self.fluid.solver == "jacobi":
             return SolveMethod("jacobi", self.fluid.sweeps)
-        top, tolerance = self._levels[0], tolerance_of(self.fluid)
+        top, tolerance = self._levels[0], tolerance_of(self.fluid, self._fixed_tolerance)
         sweeps = self.system.plan_sweeps(top.least, 2 - top.least, top.centre, tolerance)
         return sweeps or self.system.plan_cycles(tolerance)
 
@@ -150,10 +160,13 @@ class SeparateDiffusion:
     no-slip walls it is not.
     """
 
-    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device):
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, fixed_tolerance: float = 1.0):
         self.fluid, walls = fluid, fluid.boundary
         points = (Location(walls.u_rules(), (True, False)), Location(walls.v_rules(), (False, True)))
-        self.components = [ScalarDiffusion(grid, fluid, location, device) for location in points]
+        self.components = [
+            ScalarDiffusion(grid, fluid, location, device, fixed_tolerance=fixed_tolerance)
+            for location in points
+        ]
         self.device, self.layout = device, Layout(grid.nx, grid.ny)
         self.out, self.mu_bar = vector(self.layout, device, 2), field(self.layout, device)
         self._numbers = Scalars(device, ax=grid.hx**-2, ay=grid.hy**-2)
@@ -212,9 +225,14 @@ class CoupledDiffusion:
     """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
 
     def __init__(
-        self, fluid: Fluid, coefficients: Coefficients, device: wp.Device, jump_tolerance: float = 1.0
+        self,
+        fluid: Fluid,
+        coefficients: Coefficients,
+        device: wp.Device,
+        jump_tolerance: float = 1.0,
+        fixed_tolerance: float = 1.0,
     ):
-        self._jump_tolerance = jump_tolerance
+        self._jump_tolerance, self._fixed_tolerance = jump_tolerance, fixed_tolerance
         self.fluid, self.coefficients, self.device = fluid, coefficients, device
         self.layout = coefficients.levels[0].layout
         size, walls = coefficients.size, fluid.boundary
@@ -234,19 +252,20 @@ class CoupledDiffusion:
 
         `update_coefficients` must run before the next `diffuse`: `Step.plan` sees to that.
         """
-        stiffness, tolerance = self.coefficients.stiffness(dt), tolerance_of(self.fluid)
+        stiffness, tolerance = self.coefficients.stiffness(dt), self.fluid.diffusion_tolerance
+        fixed = tolerance_of(self.fluid, self._fixed_tolerance)
         self._allow(dt)
         self._norm = stiffness.greatest
         for depth, level in enumerate(self._levels):
             level.set_step(dt, 0.0 if depth else stiffness.least)
         if self.fluid.solver == "jacobi":
             self.method = SolveMethod("jacobi", self.fluid.sweeps)
-        elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, tolerance):
+        elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, fixed):
             self.method = sweeps
-        elif _stiff(stiffness) or tolerance <= SURE_TOLERANCE:
+        elif _stiff(stiffness) or fixed <= SURE_TOLERANCE:
             self.method = conjugate_gradients(min(tolerance, self._jump_tolerance))
         else:
-            self.method = self.system.plan_cycles(tolerance)
+            self.method = self.system.plan_cycles(fixed)
         self.system.prepare(self.method)
         return self.method
 
