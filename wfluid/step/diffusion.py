@@ -4,10 +4,10 @@ Both solve A d = v - A v0 for the change d = v' - v0, where v0 = v / (1 + dt alp
 alone. So uniform motion stays exact, and the solver's tolerance is relative to the change. With a symmetric
 solver M the stage is v' = v0 + M (v - A v0), and its transpose has the same factors in opposite order.
 
-The error of a solve stays with the flow, and that of the next step adds to it. So a step's error is limited by
-what the errors of all steps make the map lose, `Fluid.diffusion_loss`. Beside stiff paint a relative residual
-does not show that loss: the forces within the paint are large, and the motion of a stiff patch as a body changes
-the residual little.
+The error of a solve stays with the flow, and that of the next step adds to it. So a step's error is limited
+by what the errors of all steps make the map lose, `Fluid.diffusion_loss`. Beside stiff paint a relative
+residual does not show that loss: forces within the paint are large, and the motion of a stiff patch as a body
+changes the residual little.
 """
 
 from __future__ import annotations
