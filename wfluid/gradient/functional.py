@@ -53,7 +53,7 @@ from wfluid.step.step import Step
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Largest tolerance of conjugate gradients, a relative residual."""
 
-FIXED_TOLERANCE = {"float32": 1e-6, "float64": 1e-9}[Real.__name__]
+FIXED_TOLERANCE = {"float32": 1e-5, "float64": 1e-9}[Real.__name__]
 """Largest tolerance of sweeps and cycles, whose rates change with viscosity, where that is free or moves."""
 
 ROUNDING = 1e-6
