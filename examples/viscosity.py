@@ -1,7 +1,9 @@
 """One force, three viscosities: the thicker the fluid, the less the picture moves.
 
-Figure 2 of "Control Methods for Fluid-Based Image Warping" (Bonilla & Velho): the same force on the same
-picture with mu = 0.001, 0.002 and 0.005, side by side and labelled.
+Figure 2 of "Control Methods for Fluid-Based Image Warping" (Bonilla & Velho): the same oscillating force on
+the same picture in three fluids, side by side and labelled. The movement is large in the first one and
+imperceptible in the last one. The paper's values, 0.001 to 0.005, are in units that it does not state; in
+wfluid's units (`--viscosity`) they would differ by little, since this force meets hardly any friction there.
 
     python examples/viscosity.py --output viscosity.gif
 """
@@ -13,22 +15,26 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from wfluid import Animation, Constant, Fluid, GaussianForce, Picture, Timeline, read_picture
+from wfluid import Animation, Drawing, Fluid, Picture, Timeline, parse_force, read_picture
 from wfluid.files.output import open_output
 
 PICTURE = Path(__file__).parent / "images" / "astronaut.jpg"
 
-VISCOSITIES = (0.001, 0.002, 0.005)
+VISCOSITIES = (0.01, 0.1, 10.0)
 
-FORCE = GaussianForce(center=(0.44, 0.27), vector=(0.7, 0.35), radius=0.06, envelope=Constant(0.0, 0.5))
+PUSH = "225,140:30,15:period=1,radius=80"
 
 
-def animations(duration=1.0, fps=15.0, cells=192, width=300, device=None):
+def animations(duration=4.0, fps=15.0, cells=192, width=300, device=None):
     """The same animation in each of the fluids."""
     picture = read_picture(PICTURE)
+    force = Drawing(picture.width, picture.height, max(duration, 1.0)).force(parse_force("push", PUSH))
     timeline = Timeline(duration, fps)
     size = {"cells": cells, "width": width, "height": width, "device": device}
-    return [Animation(picture, Fluid(viscosity=mu), (FORCE,), timeline, **size) for mu in VISCOSITIES]
+    return [
+        Animation(picture, Fluid(viscosity=mu, diffusion_tolerance=1e-3), (force,), timeline, **size)
+        for mu in VISCOSITIES
+    ]
 
 
 def side_by_side(frames):
@@ -45,14 +51,16 @@ def side_by_side(frames):
 
 
 def check(frames_of_each):
-    """The longest displacement at the end falls as the viscosity rises, and nothing folds.
+    """The longest displacement falls from tens of pixels to less than half of one, and nothing folds.
 
     `frames_of_each` holds the frames of each animation. Returns the displacements [px of a 512 px picture].
     """
-    last = [frames[-1].quality for frames in frames_of_each]
-    reached = [quality.displacement_max * 512 for quality in last]
-    assert reached[0] > 1.1 * reached[1] > 1.1 * 1.2 * reached[2], reached
-    assert all(0.9 < quality.jacobian_min and quality.jacobian_max < 1.1 for quality in last), last
+    reached = [max(frame.quality.displacement_max for frame in frames) * 512 for frames in frames_of_each]
+    large, middle, imperceptible = reached
+    assert large > 30 and imperceptible < 0.5, reached
+    assert large > 2 * middle > 2 * 20 * imperceptible, reached
+    qualities = [frame.quality for frames in frames_of_each for frame in frames]
+    assert all(quality.jacobian_min > 0.95 and quality.jacobian_max < 1.05 for quality in qualities)
     return reached
 
 
@@ -62,7 +70,7 @@ def main():
     parser.add_argument(
         "--output", default="viscosity.gif", help="x.gif, x.mp4 or x.####.png (viscosity.gif)"
     )
-    parser.add_argument("--frames", type=int, default=16, help="frames to make, at 15 a second (16)")
+    parser.add_argument("--frames", type=int, default=61, help="frames to make, at 15 a second (61)")
     parser.add_argument("--cells", type=int, default=192, help="cells along a side (192)")
     parser.add_argument("--width", type=int, default=300, help="width of each panel [px] (300)")
     parser.add_argument("--device", default=None, help="cpu (default), cuda, …")
@@ -76,7 +84,7 @@ def main():
         output.write(side_by_side(frames))
     output.close()
     print(f"{output.written[-1]}: {options.frames} frames")
-    if options.frames > 8:
+    if options.frames > 60:
         print("displacement [px]:", check(frames_of_each))
     return 0
 

@@ -6,7 +6,8 @@ respect to the field, they are linear combinations of the moments
 
     M_ab = sum over the points of  f_bar r_x^a r_y^b g        a + b <= 4
 
-(`wfluid/step/gaussians`), which are summed along rows first.
+(`wfluid/step/gaussians`), which are summed along rows first. On periodic axes r_x^a g_x is the sum over all
+images, which is r_x^a g_x of the profile plus its excess (`step/forces`).
 """
 
 import warp as wp
@@ -16,7 +17,7 @@ from wfluid.kernels.cell.program import adjoint_cells, adjoint_lines
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
 from wfluid.kernels.solve.sums import LANES, Lane, total_of_lanes
 from wfluid.kernels.step.differences import mean_f
-from wfluid.kernels.step.forces import in_profile
+from wfluid.kernels.step.forces import images_beside, in_profile
 
 ORDERS = wp.constant(5)
 """Number of powers of r: 0 … 4."""
@@ -29,8 +30,13 @@ MOMENTS = wp.constant(15)
 def row_moments(
     t: int,
     f_bar: Field,
-    g_x: Field,
     r_x: Field,
+    g_x: Field,
+    excess_2: Field,
+    excess_3: Field,
+    excess_4: Field,
+    radius: Field,
+    period: Real,
     boxes: Indices,
     ny: int,
     pitch: int,
@@ -38,7 +44,10 @@ def row_moments(
     # outputs
     sums: Field,
 ):
-    """sums[t, a] = sum of f_bar r_x^a g_x over the box's columns, of row t % ny and Gaussian t // ny."""
+    """sums[t, a] = sum of f_bar r_x^a g_x over the box's columns, of row t % ny and Gaussian t // ny.
+
+    `period` is the length of a periodic axis, 0 between walls.
+    """
     n = t // ny
     j = t - n * ny
     first = boxes[4 * n]
@@ -69,6 +78,12 @@ def row_moments(
             sum2[0] += value * r * r
             sum3[0] += value * r * r * r
             sum4[0] += value * r * r * r * r
+        if images_beside(radius[n], period) > 0:
+            for i in range(first, end):
+                value = f_bar[row + i]
+                sum2[0] += value * excess_2[table + i]
+                sum3[0] += value * excess_3[table + i]
+                sum4[0] += value * excess_4[table + i]
         entry_0 = ORDERS * t
         sums[entry_0] = total_of_lanes(sum0)
         sums[entry_0 + 1] = total_of_lanes(sum1)
@@ -81,15 +96,23 @@ def row_moments(
 def moments(
     t: int,
     sums: Field,
-    g_y: Field,
     r_y: Field,
+    g_y: Field,
+    excess_2: Field,
+    excess_3: Field,
+    excess_4: Field,
+    radius: Field,
+    period: Real,
     boxes: Indices,
     ny: int,
     pitch_y: int,
     # outputs
     out: Field,
 ):
-    """out[t, m] = sum of sums r_y^b g_y over the box's rows: moment m = (a, b) of Gaussian t."""
+    """out[t, m] = sum of sums r_y^b g_y over the box's rows: moment m = (a, b) of Gaussian t.
+
+    `period` is the length of a periodic axis, 0 between walls.
+    """
     entry_0 = MOMENTS * t
     for m in range(MOMENTS):
         out[entry_0 + m] = Real(0.0)
@@ -103,6 +126,14 @@ def moments(
                 out[m] = out[m] + value
                 value = value * r_y[y]
                 m = m + 1
+        if images_beside(radius[t], period) > 0:
+            for a in range(ORDERS - 2):
+                m = entry_0 + a * ORDERS - a * (a - 1) // 2
+                out[m + 2] = out[m + 2] + sums[row + a] * excess_2[y]
+                if a < 2:
+                    out[m + 3] = out[m + 3] + sums[row + a] * excess_3[y]
+                if a < 1:
+                    out[m + 4] = out[m + 4] + sums[row + a] * excess_4[y]
 
 
 @adjoint_cells

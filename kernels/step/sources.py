@@ -6,13 +6,13 @@ divergence s = div v makes the picture grow or shrink; with r = (x - c) / sigma
     s(x) = a (1 - |r|^2 / 2) exp(-|r|^2 / 2)
 
 has integral 0 over the plane, since it is the divergence of a (x - c) exp(-|r|^2 / 2) / 2. Both are
-sums of products of profiles along x and y (`forces`).
+sums of products of profiles along x and y, and sums over all images on periodic axes (`forces`).
 """
 
 from wfluid.kernels.cell.native import gather, inside
 from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real, Uniform
-from wfluid.kernels.step.forces import in_profile
+from wfluid.kernels.step.forces import images_beside, in_profile
 
 
 @cells
@@ -46,19 +46,34 @@ def swell(
     centre_y: Field,
     r_x: Field,
     r_y: Field,
+    excess_x: Field,
+    excess_y: Field,
+    radius: Field,
+    period_x: Real,
+    period_y: Real,
     pitch_x: int,
     pitch_y: int,
     # outputs
     s: Field,
 ):
-    """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place."""
+    """s += rate (1 - |r|^2 / 2) g [1/s] of source n at centre k, in place.
+
+    The excesses are those of r^2 g along axes of lengths `period_x` and `period_y`, 0 between walls.
+    """
     k = inside(k)
     column = in_profile(n, i, pitch_x)
     row = in_profile(n, j, pitch_y)
     x = gather(r_x, column)
     y = gather(r_y, row)
-    g = gather(centre_x, column) * gather(centre_y, row)
-    s[k] = s[k] + gather(rate, n) * (Real(1.0) - Real(0.5) * (x * x + y * y)) * g
+    g_x = gather(centre_x, column)
+    g_y = gather(centre_y, row)
+    amount = gather(rate, n)
+    s[k] = s[k] + amount * (Real(1.0) - Real(0.5) * (x * x + y * y)) * (g_x * g_y)
+    sigma = gather(radius, n)
+    if images_beside(sigma, period_x) > 0:
+        s[k] = s[k] - Real(0.5) * amount * gather(excess_x, column) * g_y
+    if images_beside(sigma, period_y) > 0:
+        s[k] = s[k] - Real(0.5) * amount * g_x * gather(excess_y, row)
 
 
 @cells

@@ -37,6 +37,8 @@ DISC = np.hypot(*(np.mgrid[0:96, 0:128] / 96 - 0.5)) < 0.2
 FLUIDS = {
     "constant": {"viscosity": 0.001},
     "paper": {"scheme": "paper", "sweeps": 5},
+    "paper, painted": {"scheme": "paper", "sweeps": 5, "viscosity": np.where(DISC, 1.0, 0.001)},
+    "periodic": {"walls": "periodic"},
     "smooth": {"viscosity": 0.02 + 0.01 * np.cos(np.arange(128) / 20) * np.ones((96, 1))},
     "jump": {"viscosity": np.where(DISC, 1.0, 0.001)},
     "moves": {"viscosity": np.where(DISC, 1.0, 0.001), "viscosity_moves": True},

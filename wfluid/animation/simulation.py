@@ -20,7 +20,7 @@ from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver, SolveReport
 
 POOR_RESIDUAL = 0.02
-"""Relative residual of the projection above which a frame warns."""
+"""Relative residual of the projection, and of the diffusion by Jacobi sweeps, above which a frame warns."""
 
 
 class PoorSolveWarning(UserWarning):
@@ -85,16 +85,13 @@ class Simulation:
 
 
 def _judge(solve: SolveReport, fluid: Fluid, index: int, t: float, warned: bool) -> bool:
-    """Stop where the fluid is not finite; warn once of a solve with a large residual.
-
-    The paper's own scheme gives no warning: few Jacobi sweeps are part of it.
-    """
+    """Stop where the fluid is not finite; warn once of a solve with a large residual."""
     pressure = solve.pressure
     if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
         raise FloatingPointError(
             f"frame {index}: the velocity is no longer finite; use smaller forces or steps"
         )
-    if warned or fluid.scheme == "paper":
+    if warned:
         return warned
     text = _poor(solve, fluid, t)
     if text:
@@ -105,13 +102,13 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, t: float, warned: bool)
 def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
     """A warning of a large residual, with the remedy; None if there is none."""
     pressure, diffusion = solve.pressure, solve.diffusion
+    if pressure.method == "jacobi":
+        return _unconverged(pressure.relative, diffusion.relative, fluid)
     if pressure.relative > POOR_RESIDUAL:
         left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"
         if pressure.method == "multigrid":
             more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
             return f"{left} cycles; {more}"
-        if pressure.method == "jacobi":
-            return f"{left} sweeps; set solver (--solver) to multigrid"
         return f"{left} iterations; soften the edges of the freeze mask"
     if diffusion.unfinished:
         return (
@@ -122,8 +119,19 @@ def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
     excess = solve.map_loss / (fluid.diffusion_loss * max(1.0, t))
     if excess > MARGIN:
         left = f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side"
-        if diffusion.method == "jacobi":
-            return f"{left}; set solver (--solver) to multigrid"
         less = fluid.diffusion_tolerance / excess
         return f"{left}; set diffusion_tolerance (--diffusion-tolerance) to {less:.1e}"
     return None
+
+
+def _unconverged(divergence: float, change: float, fluid: Fluid) -> str | None:
+    """A warning of the parts of divergence and viscous change that Jacobi sweeps left, if one is large."""
+    if max(divergence, change) <= POOR_RESIDUAL:
+        return None
+    remedy = "set solver (--solver) to multigrid"
+    if fluid.scheme == "paper":
+        remedy += " or scheme (--scheme) to standard"
+    return (
+        f"{fluid.sweeps} Jacobi sweeps left {divergence:.1e} of the divergence and {change:.1e} of the "
+        f"viscous change: they have not converged; {remedy}"
+    )

@@ -355,6 +355,8 @@ def _check_solves(fluid: Fluid, free: bool) -> None:
     what = "a free viscosity" if free else "a viscosity that moves"
     if not (free or fluid.viscosity_moves):
         return
+    if fluid.scheme == "paper" and not fluid.uniform:
+        raise ValueError(f"{what} has no gradient in the scheme 'paper': set scheme to 'standard'")
     if fluid.solver == "jacobi":
         raise ValueError(f"{what} needs a diffusion solved to a tolerance: set solver to 'multigrid'")
     if fluid.diffusion_tolerance > SURE_TOLERANCE:

@@ -29,7 +29,7 @@ class WorkingStates:
     """The states before and after the step that a loop is at, and the gradients with respect to them."""
 
     def __init__(self, step: Step, points: int):
-        self._with_pressure = step.coefficients is not None
+        self._with_pressure = step.projection.accumulates_pressure
         self.before, self.after, self.bar, self.after_bar = (
             State.at_rest(step.grid, step.device, len(step.densities), points) for _ in range(WORKING_STATES)
         )
@@ -162,9 +162,12 @@ class StepLoops:
         self._read_numbers()
         for table, f in zip(self.states, states.stored(states.before), strict=True):
             table.take(counter, f)
+        if self.step.paper:  # its transport reads the velocity after the step
+            for table, f in zip(self.states, (states.after.u, states.after.v), strict=False):
+                table.take(counter, f, ahead=1)
         for table, p_bar in zip(self.particle_bars, states.after_bar.particles, strict=True):
             table.add_to(counter, p_bar, ahead=1)
-        self.step.recompute(states.before, self.forcing)
+        self.step.recompute(states.before, states.after, self.forcing)
         self._tape.backward()
         self.bars.give(counter, self.forcing.bars)
         pairs = zip(self.states, states.stored(states.bar), states.stored(states.after_bar), strict=True)

@@ -37,8 +37,10 @@ class Fluid:
     """Boundary conditions at the edges: `Walls`, or "free-slip", "no-slip", "periodic", or one for each axis
     as "x,y"."""
     scheme: str = SCHEMES[0]
-    """"standard": midpoint backtraces and cubic interpolation. "paper": Euler backtraces, bilinear
-    interpolation and Jacobi solves, as in Bonilla & Velho."""
+    """"standard": midpoint backtraces and cubic interpolation. "paper", as in Bonilla & Velho: Euler
+    backtraces along the velocity after forces, bilinear interpolation, Jacobi solves, and a map that moves
+    with the projected velocity. There a painted mu diffuses each component by div(mu grad f), since
+    undamped Jacobi sweeps do not converge for the stress, which couples them."""
     solver: str | None = None
     """"multigrid" (default of the standard scheme) or "jacobi" (default of the paper's)."""
     pressure_cycles: int = CYCLES
@@ -103,6 +105,11 @@ class Fluid:
 
     @property
     def separable(self) -> bool:
-        """Whether the components of the velocity diffuse independently: uniform, and no no-slip wall."""
+        """Whether the components of the velocity diffuse independently, with one constant viscosity.
+
+        With no-slip walls only the paper's scheme treats them so.
+        """
         walls = self.boundary
+        if self.scheme == "paper":
+            return self.uniform
         return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)

@@ -1,8 +1,8 @@
 """Forces, as frozen descriptions: a shape in space times an envelope in time.
 
 A `LocalForce` is a Gaussian g = exp(-|x - c|^2 / 2 sigma^2) about a center c that may move, or g times a low
-power of x - c; `GaussianImpulse` holds its parameters over a step. A `FieldForce` is a field over the entire
-picture, computed once.
+power of x - c; `GaussianImpulse` holds its parameters over a step. On a periodic axis the images of a
+Gaussian, one period apart, add up. A `FieldForce` is a field over the entire picture, computed once.
 """
 
 from __future__ import annotations

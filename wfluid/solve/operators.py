@@ -24,6 +24,9 @@ SMOOTHED_STRESS = 0.14
 SWEEPS_STRESS = 2
 """Sweeps on each side of the coarse correction in the coupled equation."""
 
+STRESS_NUMBERS = ("normal_x", "normal_y", "shear_x", "shear_y", "cross")
+"""Coefficients of the coupled equation (`kernels/solve/stress`)."""
+
 FIVE_POINT_INTERVAL = (0.8, 1.0)
 """Interval of the eigenvalues of a cycle times A for the five-point equations."""
 
@@ -127,48 +130,67 @@ class VariablePoisson(Level):
 
 
 class ViscousStress(Level):
-    """The operator A v = v + dt alpha v - dt div (mu (grad v + grad v^T)), which couples u and v."""
+    """The operator A v = v + dt alpha v - dt div (mu (grad v + grad v^T)), which couples u and v.
 
-    def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
+    If not `coupled`, it is A f = f + dt alpha f - dt div (mu grad f) for each component f.
+    """
+
+    def __init__(
+        self,
+        medium: CoefficientLevel,
+        size: tuple[float, float],
+        walls: Walls,
+        device: wp.Device,
+        coupled: bool = True,
+    ):
         layout = medium.layout
         points = [Location(walls.u_rules(), (True, False)), Location(walls.v_rules(), (False, True))]
         super().__init__(layout.nx, layout.ny, size, points, device)
-        self.medium = medium
+        self.medium, self._coupled = medium, coupled
         self.weights = vector(layout, device, 2)
         rates = [f"rate_{n}" for n in range(SWEEPS_STRESS)]
-        self.numbers = Scalars(
-            device, "dt", "normal_x", "normal_y", "shear_x", "shear_y", "cross", "plain", *rates
-        )
+        weighed = [f"weighed_{name}" for name in STRESS_NUMBERS]
+        self.numbers = Scalars(device, "dt", "plain", *STRESS_NUMBERS, *weighed, *rates)
         self.rates = tuple(getattr(self.numbers, rate) for rate in rates)
         self.plain = self.numbers.plain
 
-    def set_step(self, dt: float, least: float) -> None:
-        """Set the time step dt [s]; the eigenvalues of M^-1 A on the finest level are at least `least`."""
+    def set_step(self, dt: float, least: float, plain: bool = False) -> None:
+        """Set the time step dt [s]; the eigenvalues of M^-1 A on the finest level are at least `least`.
+
+        M is the row sums of |A|, or with `plain` the diagonal of A, of an operator that is not coupled.
+        """
         hx, hy = self.h
         rates = chebyshev_factors(max(least, SMOOTHED_STRESS), 1.0, SWEEPS_STRESS)
-        self.numbers.set(
-            dt=dt,
-            normal_x=2 * dt / hx**2,
-            normal_y=2 * dt / hy**2,
-            shear_x=dt / hx**2,
-            shear_y=dt / hy**2,
-            cross=dt / (hx * hy),
-            plain=1.0,
-            **{f"rate_{n}": rate for n, rate in enumerate(rates)},
-        )
+        normal, cross = (2, 1) if self._coupled else (1, 0)
+        numbers = {
+            "normal_x": normal * dt / hx**2,
+            "normal_y": normal * dt / hy**2,
+            "shear_x": dt / hx**2,
+            "shear_y": dt / hy**2,
+            "cross": cross * dt / (hx * hy),
+        }
+        # a row's other entries sum to as much as the viscous part of its diagonal
+        part = 0.5 if plain else 1.0
+        weighed = {f"weighed_{name}": part * value for name, value in numbers.items()}
+        swept = {f"rate_{n}": rate for n, rate in enumerate(rates)}
+        self.numbers.set(dt=dt, plain=1.0, **numbers, **weighed, **swept)
 
     def weigh(self) -> None:
         """Compute M^-1, the weights of the sweeps, after the medium or the step change: launches only."""
         with together():
-            for axis, medium in enumerate(self._axes()):
+            for axis, medium in enumerate(self._axes("weighed_")):
                 stress.weight.launch(self.layout, self.device, medium, [self.weights[axis]])
 
-    def _axes(self) -> tuple[list, list]:
-        """Medium, coefficients and strides of u, then of v with the axes exchanged, as in `stress`."""
+    def _axes(self, kind: str = "") -> tuple[list, list]:
+        """Medium, coefficients and strides of u, then of v with the axes exchanged, as in `stress`.
+
+        The coefficients are those of the operator, or with `kind` "weighed_" those of its weights.
+        """
         c, medium, pitch = self.numbers, [self.medium.mu, self.medium.alpha], self.layout.pitch
+        normal_x, normal_y, shear_x, shear_y, cross = (getattr(c, kind + name) for name in STRESS_NUMBERS)
         return (
-            [*medium, c.dt, c.normal_x, c.shear_y, c.cross, 1, pitch],
-            [*medium, c.dt, c.normal_y, c.shear_x, c.cross, pitch, 1],
+            [*medium, c.dt, normal_x, shear_y, cross, 1, pitch],
+            [*medium, c.dt, normal_y, shear_x, cross, pitch, 1],
         )
 
     def residual(self, b: Vector, x: Vector, out: Vector) -> None:

@@ -215,14 +215,19 @@ class SeparateDiffusion:
                 viscosity_adjoint.add_diffused.launch(self.layout, self.device, inputs, [self.mu_bar])
 
     def measure(self) -> Residual:
-        """The residual of the last solve for u, relative to the change it made; the error of u and v."""
-        u, v = self.components
-        residual = u.measure()
-        return replace(residual, error=math.hypot(residual.error, v.error()))
+        """The residual for u, relative to its change, or for v where u is at rest; the error of both."""
+        of_u, of_v = self.components
+        u, v = of_u.measure(), of_v.error()
+        residual = u if u.norm_b else of_v.measure()
+        return replace(residual, error=math.hypot(u.error, v))
 
 
 class CoupledDiffusion:
-    """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together."""
+    """(1 + dt alpha) v' - dt div (mu (grad v' + grad v'^T)) = v, u and v together.
+
+    With scheme "paper" it is (1 + dt alpha) f' - dt div (mu grad f') = f for each component f, which for
+    constant mu is the equation of `SeparateDiffusion`.
+    """
 
     def __init__(
         self,
@@ -236,7 +241,10 @@ class CoupledDiffusion:
         self.fluid, self.coefficients, self.device = fluid, coefficients, device
         self.layout = coefficients.levels[0].layout
         size, walls = coefficients.size, fluid.boundary
-        self._levels = [ViscousStress(level, size, walls, device) for level in coefficients.levels]
+        paper = fluid.scheme == "paper"
+        self._levels = [
+            ViscousStress(level, size, walls, device, coupled=not paper) for level in coefficients.levels
+        ]
         self.system = LinearSystem(self._levels, device, STRESS_INTERVAL)
         self.method = SolveMethod("none", 0)
         self.out, self._scaled, self._b, self._x = (vector(self.layout, device, 2) for _ in range(4))
@@ -256,9 +264,10 @@ class CoupledDiffusion:
         fixed = tolerance_of(self.fluid, self._fixed_tolerance)
         self._allow(dt)
         self._norm = stiffness.greatest
+        paper, jacobi = self.fluid.scheme == "paper", self.fluid.solver == "jacobi"
         for depth, level in enumerate(self._levels):
-            level.set_step(dt, 0.0 if depth else stiffness.least)
-        if self.fluid.solver == "jacobi":
+            level.set_step(dt, 0.0 if depth else stiffness.least, plain=paper and jacobi)
+        if jacobi:
             self.method = SolveMethod("jacobi", self.fluid.sweeps)
         elif sweeps := self.system.plan_sweeps(stiffness.least, 1.0, 1.0, fixed):
             self.method = sweeps

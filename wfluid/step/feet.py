@@ -1,4 +1,4 @@
-"""Traces along the velocity at the beginning of a step: the feet of all centres, and points; with transposes.
+"""Traces along the velocity: the feet of all centres, and points; with transposes.
 
 foot = x - dt v(x - dt v(x) / 2)        with scheme "paper": x - dt v(x)
 point = p + dt v(p + dt v(p) / 2)

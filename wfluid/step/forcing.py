@@ -65,6 +65,8 @@ class Forcing:
         self.grid, self.layout, self.device = grid, Layout(grid.nx, grid.ny), device
         self._forces = tuple(forces)  # stored, so that no other object gets an id that is in the key
         walls = fluid.boundary
+        sizes = zip((grid.width, grid.height), walls.periodic, strict=True)
+        self._periods = [size for size, periodic in sizes if periodic]
         gaussian_forces, growths = _by_weight(self._forces)
         self._gaussian_forces = [
             GaussianForces(*group, grid, walls, device, gradients) for group in gaussian_forces
@@ -199,6 +201,8 @@ class Forcing:
                     "window help"
                 )
             gained = max(impulse.gained, abs(impulse.swell) * impulse.radius)
+            for period in self._periods:
+                gained *= max(1.0, 3 * impulse.radius / period)  # a bound of the sum of the images
             _check(f"the force at {impulse.center}", gained, t, until)
         prescribed = sum(abs(impulse.swell) for impulse in impulses.values())
         pressure_part = 0.0 if prescribed else pressure_part

@@ -99,12 +99,12 @@ class GaussianBatch:
         x, y = self._x, self._y
         self._profile(faces=True)
         self._profile()
-        profiles = [x.on_faces[1], x.at_centres[1], y.at_centres[1], y.on_faces[1]]
+        profiles = [x.on_faces.g, x.at_centres.g, y.at_centres.g, y.on_faces.g]
         inputs = [
             *self._strengths[:3],
             *profiles,
-            x.at_centres[0],
-            y.at_centres[0],
+            x.at_centres.r,
+            y.at_centres.r,
             x.layout.pitch,
             y.layout.pitch,
         ]
@@ -112,14 +112,16 @@ class GaussianBatch:
 
     def swell(self, s: wp.array) -> None:
         """Add the prescribed divergence to a field, in place: launches only."""
-        (r_x, g_x), (r_y, g_y) = self._profile()
-        inputs = [self._strengths[3], g_x, g_y, r_x, r_y, self._x.layout.pitch, self._y.layout.pitch]
+        x, y = self._profile()
+        profiles = [x.g, y.g, x.r, y.r, x.excess[0], y.excess[0]]
+        inputs = [self._strengths[3], *profiles, self._radius, self._x.period, self._y.period]
+        inputs += [self._x.layout.pitch, self._y.layout.pitch]
         sources.swell.launch(self.layout, self.device, inputs, [s], boxes=self._boxes)
 
     def pour(self, rho: wp.array) -> None:
         """Add the amounts to a density, in place: launches only."""
-        (_, g_x), (_, g_y) = self._profile()
-        inputs = [self._strengths[4], g_x, g_y, self._x.layout.pitch, self._y.layout.pitch]
+        x, y = self._profile()
+        inputs = [self._strengths[4], x.g, y.g, self._x.layout.pitch, self._y.layout.pitch]
         sources.pour.launch(self.layout, self.device, inputs, [rho], boxes=self._boxes)
 
     def measure_push(self, velocity_bar: Vector) -> None:
@@ -134,13 +136,14 @@ class GaussianBatch:
         """Compute the moments of the gradient after `swell` or `pour`, a field at centres: launches only."""
         self._measure(0, f_bar, *self._profile())
 
-    def _measure(self, component: int, f_bar: wp.array, x: Vector, y: Vector) -> None:
+    def _measure(self, component: int, f_bar: wp.array, x: _Profile, y: _Profile) -> None:
         """Compute the moments of f_bar with the profiles x and y, as those of a `component`."""
-        (r_x, g_x), (r_y, g_y) = x, y
         ny, count, device = self.layout.ny, self.count, self.device
-        inputs = [f_bar, g_x, r_x, self._boxes, ny, self.layout.pitch, self._x.layout.pitch]
+        inputs = [f_bar, *x.arrays, self._radius, self._x.period]
+        inputs += [self._boxes, ny, self.layout.pitch, self._x.layout.pitch]
         forces_adjoint.row_moments.launch(count * ny, device, inputs, [self._sums])
-        inputs = [self._sums, g_y, r_y, self._boxes, ny, self._y.layout.pitch]
+        inputs = [self._sums, *y.arrays, self._radius, self._y.period]
+        inputs += [self._boxes, ny, self._y.layout.pitch]
         forces_adjoint.moments.launch(count, device, inputs, [self._moments[component]])
 
     def push_gradient(self, numbers: np.ndarray, moments: np.ndarray) -> np.ndarray:
@@ -183,22 +186,33 @@ class GaussianBatch:
         fields = moments.reshape(len(moments), _FIELDS, self.count, -1).astype(np.float64)
         return table, [_Moments(fields[:, n]) for n in range(_FIELDS)]
 
-    def _profile(self, faces: bool = False) -> tuple[Vector, Vector]:
+    def _profile(self, faces: bool = False) -> tuple[_Profile, _Profile]:
         """Compute the profiles along both axes, at faces or at centres. Returns those at centres."""
         for axis, center in ((self._x, self._center_x), (self._y, self._center_y)):
             start, out = (0.0, axis.on_faces) if faces else (0.5, axis.at_centres)
             inputs = [center, self._radius, start, axis.h, axis.period]
-            forces.profile.launch(axis.layout, self.device, inputs, out)
+            forces.profile.launch(axis.layout, self.device, inputs, [out.r, out.g])
+            if axis.period:
+                inputs += [axis.points, axis.layout.pitch]
+                forces.add_images.launch(self.count, self.device, inputs, out.arrays)
         return self._x.at_centres, self._y.at_centres
 
 
+class _Profile:
+    """For each Gaussian its distances r [radii], values g and excesses at the points of one axis."""
+
+    def __init__(self, layout: Layout, device: wp.Device):
+        self.arrays = vector(layout, device, 5)
+        self.r, self.g, *self.excess = self.arrays
+
+
 class _Profiles:
-    """Profiles along one axis: for each Gaussian its distances r [radii] and values, at faces and centres."""
+    """Profiles along one axis, at faces and at centres. `period` is 0 between walls."""
 
     def __init__(self, count: int, points: int, h: float, period: float, device: wp.Device):
         self.points, self.h, self.period = points, h, period
         self.layout = Layout(points, count)
-        self.on_faces, self.at_centres = (vector(self.layout, device, 2) for _ in range(2))
+        self.on_faces, self.at_centres = (_Profile(self.layout, device) for _ in range(2))
 
 
 class _Moments:

@@ -69,7 +69,7 @@ class Projection:
         self.without_pressure = vector(self.layout, device, 2)
         numbers = Scalars(device, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
         self._inverse_h = [numbers.inverse_hx, numbers.inverse_hy]
-        self.accumulates_pressure = not fluid.separable
+        self.accumulates_pressure = not fluid.separable and fluid.scheme != "paper"
 
     q: wp.array
     """The pressure of the last projection, with ghosts [longer side^2/s]."""
