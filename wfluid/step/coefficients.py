@@ -38,6 +38,8 @@ class Stiffness:
     """An upper bound of the eigenvalues of A."""
     jump: float
     """Largest ratio of row sums `REACH` cells apart."""
+    contrast: float
+    """Largest ratio of any two row sums."""
 
 
 class Coefficients:
@@ -188,6 +190,7 @@ class Coefficients:
             least=float(1 / (1 + per_mu * mu.max() / drag.min())),
             greatest=float(drag.max() + per_mu * mu.max()),
             jump=_steepest(rows) if local else float(rows.max() / drag.min()),
+            contrast=float(rows.max() / (rows if local else drag).min()),
         )
 
     def drag_jump(self, dt: float) -> float:
