@@ -202,6 +202,8 @@ FLAGS = {
     "--scheme": ("paper", {"fluid": {"scheme": "paper"}}),
     "--solver": ("jacobi", {"fluid": {"solver": "jacobi"}}),
     "--pressure-cycles": ("4", {"fluid": {"pressure_cycles": 4}}),
+    "--diffusion-tolerance": ("1e-3", {"fluid": {"diffusion_tolerance": 1e-3}}),
+    "--diffusion-loss": ("0.5", {"fluid": {"diffusion_loss": 0.5}}),
     "--fps": ("12.5", {"time": {"fps": 12.5}}),
     "--duration": ("3", {"time": {"duration": 3.0}}),
     "--substeps": ("5", {"time": {"substeps": 5}}),

@@ -319,6 +319,8 @@ def _others():
         ("[fluid]", "scheme", "paper", get("fluid.scheme"), "paper"),
         ("[fluid]", "solver", "jacobi", get("fluid.solver"), "jacobi"),
         ("[fluid]", "pressure_cycles", 5, get("fluid.pressure_cycles"), 5),
+        ("[fluid]", "diffusion_tolerance", 1e-3, get("fluid.diffusion_tolerance"), 1e-3),
+        ("[fluid]", "diffusion_loss", 0.3, get("fluid.diffusion_loss"), 0.3 / 60),
         ("[viscosity]", "value", 0.5, stiff, (0.5, 0.5)),
         ("[viscosity]", "image", "right.png", stiff, (0, 2), {"value": 2}),
         ("[viscosity]", "floor", 0.5, stiff, (0.5, 2), image),

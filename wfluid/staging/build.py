@@ -174,6 +174,7 @@ class _Builder:
                 scheme=fluid.scheme,
                 solver=fluid.solver,
                 pressure_cycles=fluid.pressure_cycles,
+                diffusion_tolerance=fluid.diffusion_tolerance,
                 **more,
             )
 
@@ -191,7 +192,13 @@ class _Builder:
             viscosity_moves=viscosity.moves,
             freeze=self.drawing.frozen,
             densities=densities,
+            **self._loss(),
         )
+
+    def _loss(self) -> dict[str, float]:
+        """`diffusion_loss` in longer sides, if the scene gives it in pixels."""
+        loss = self.scene.fluid.diffusion_loss
+        return {} if loss is None else {"diffusion_loss": loss / self.drawing.side}
 
     def _density(self, density: DensityTable) -> Density:
         name = f"density {density.name}"

@@ -40,6 +40,8 @@ class Stiffness:
     """Least row sum of |A|."""
     jump: float
     """Largest ratio of row sums `REACH` cells apart."""
+    contrast: float
+    """Largest ratio of any two row sums."""
 
 
 class Coefficients:
@@ -195,6 +197,7 @@ class Coefficients:
             greatest=float(drag.max() + per_mu * mu.max()),
             least_row=float(rows.min()),
             jump=_steepest(rows) if local else float(rows.max() / drag.min()),
+            contrast=float(rows.max() / (rows if local else drag).min()),
         )
 
     def drag_jump(self, dt: float) -> float:

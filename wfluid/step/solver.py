@@ -44,6 +44,9 @@ class SolveReport:
     """Sum of the largest divergences that growths prescribed [1/s]."""
     removed: float = 0.0
     """Mean of the prescribed divergence, subtracted everywhere: walls and seams let no volume out [1/s]."""
+    map_loss: float = 0.0
+    """An estimate of how far places of the map are off by the solves of the diffusion since the run began
+    [longer side]; 0 for steps outside a run."""
 
 
 class Solver:

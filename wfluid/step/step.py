@@ -64,10 +64,20 @@ class Step:
     `tape.backward()` computes the gradients with respect to the state before the step, the forces and the
     viscosity, from those with respect to the state after it. A symmetric linear solver is its own
     transpose, so no sweep or iterate of a solve is recorded. For conjugate gradients that holds up to their
-    tolerance: the fluid's own, or `jump_tolerance` where that is lower.
+    tolerance: the fluid's own, or `jump_tolerance` where that is lower. Likewise the gradient with respect to
+    viscosity, which changes a fixed number of sweeps or cycles too: the diffusion is solved by as many as
+    `fixed_tolerance` needs, where that is lower than the fluid's own.
     """
 
-    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, jump_tolerance: float = 1.0):
+    def __init__(
+        self,
+        grid: Grid,
+        fluid: Fluid,
+        device: wp.Device,
+        jump_tolerance: float = 1.0,
+        fixed_tolerance: float = 1.0,
+    ):
+        self.fixed_tolerance = fixed_tolerance
         self.grid, self.fluid, self.device = grid, fluid, device
         self.layout = Layout(grid.nx, grid.ny)
         walls = fluid.boundary
@@ -95,9 +105,9 @@ class Step:
         """Make the stages that solve: diffusion and projection."""
         grid, fluid, device = self.grid, self.fluid, self.device
         self.diffusion = (
-            CoupledDiffusion(fluid, self.coefficients, device, jump_tolerance)
+            CoupledDiffusion(fluid, self.coefficients, device, jump_tolerance, fixed_tolerance)
             if self.coefficients
-            else SeparateDiffusion(grid, fluid, device)
+            else SeparateDiffusion(grid, fluid, device, fixed_tolerance)
         )
         drag = self.coefficients if fluid.freeze else None
         self.projection = Projection(grid, fluid, drag, device, self.velocity_ghosts, jump_tolerance)
