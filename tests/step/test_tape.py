@@ -23,8 +23,8 @@ from wfluid.fields.ghosts import Ghosts
 from wfluid.fields.state import State
 from wfluid.step import advection, coefficients, creeping, densities, diffusion, feet, forcing, projection
 from wfluid.step.forcing import Forcing
+from wfluid.step.inertial import InertialStep
 from wfluid.step.kinds import step_for
-from wfluid.step.step import Step
 from wfluid.step.tape import record, recording
 
 GRID = Grid(23, 18, 1.0, 0.7)
@@ -230,7 +230,7 @@ def test_every_stage_of_a_step_is_in_the_list_of_stages(device):
         tape = Recorded(device, *case).record()
         found |= {(type(launch.func.__self__), launch.func.__name__) for launch in tape.launches}
     assert found == {(kind, name) for kind, name, _ in STAGES.values()} | {
-        (kind, "_clear_gradients") for kind in (Step, creeping.CreepingStep)
+        (kind, "_clear_gradients") for kind in (InertialStep, creeping.CreepingStep)
     }
 
 
@@ -269,7 +269,7 @@ def test_without_a_tape_nothing_is_recorded_or_allocated(device, monkeypatch):
         counts[-1] += 1
         return launch(*arguments, **settings)
 
-    step, acting = Step(GRID, fluid, device), Forcing(forces, fluid, GRID, device)
+    step, acting = InertialStep(GRID, fluid, device), Forcing(forces, fluid, GRID, device)
     step.plan(DT, DT, step.update_coefficients)
     acting.set(forces, fluid, 0.0, DT, DT)
     monkeypatch.setattr(wp, "launch", counted)
@@ -298,7 +298,7 @@ def test_without_a_tape_nothing_is_recorded_or_allocated(device, monkeypatch):
 def test_a_step_in_another_thread_is_not_recorded_on_this_tape(device):
     """The tape is that of the thread, so two threads can each have a solver."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
-    step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
+    step, acting = InertialStep(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
     step.plan(DT, DT, step.update_coefficients)
     with recording() as tape, ThreadPoolExecutor(1) as other:
         other.submit(step.advance, *states, acting).result()
@@ -308,7 +308,7 @@ def test_a_step_in_another_thread_is_not_recorded_on_this_tape(device):
 def test_recording_a_stage_without_gradients_is_refused(device):
     """Else the backward pass would be wrong without an error."""
     states = [State.at_rest(GRID, device) for _ in range(2)]
-    step, acting = Step(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
+    step, acting = InertialStep(GRID, Fluid(), device), Forcing((), Fluid(), GRID, device)
     step.plan(DT, DT, step.update_coefficients)
     with pytest.raises(RuntimeError, match="missing a gradient"), recording():
         step.advance(*states, acting)
@@ -316,7 +316,7 @@ def test_recording_a_stage_without_gradients_is_refused(device):
 
 def test_allowing_gradients_twice_keeps_the_arrays(device):
     """Captured graphs contain the addresses of the transposes' arrays."""
-    step = Step(GRID, Fluid(densities=[INK]), device)
+    step = InertialStep(GRID, Fluid(densities=[INK]), device)
     stages = (step.feet, step.advection, step.projection, *step.densities)
     step.allow_gradients()
     before = [dict(vars(stage)) for stage in stages]

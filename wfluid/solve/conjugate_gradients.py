@@ -29,6 +29,7 @@ class Equation(Protocol):
     def fill(self, x: Vector) -> None:
         """Fill the ghosts of x."""
 
+
 ANY = 1e30
 """A limit of <e, A e> that any error meets."""
 

@@ -19,13 +19,12 @@ from functools import partial
 import numpy as np
 import warp as wp
 
+from wfluid.domain.grid import Grid
 from wfluid.domain.limits import CREEPING_REACH
 from wfluid.fields.arrays import Scalars, Vector, assign, copy, field, fill, vector, zeros
-from wfluid.fields.device import load_kernels
 from wfluid.fields.state import State
 from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import viscosity as viscosity_adjoint
-from wfluid.kernels.cell.program import ADJOINT
 from wfluid.kernels.cell.strips import alone, together
 from wfluid.kernels.solve import algebra
 from wfluid.model.fluid import Fluid
@@ -48,11 +47,18 @@ moves the frozen parts 20 px away by 0.3 px at 128 cells, 0.1 px at 256."""
 class CreepingStep(Step):
     """The stages of a step without inertia. The velocity of a state is the one that led to it."""
 
-    def _add_solves(self, jump_tolerance: float) -> None:
-        """Make the stage that solves: the Stokes flow."""
-        grid, media, device = self.grid, self._media, self.device
-        self.flow = StokesFlow(media.levels, (grid.width, grid.height), self.fluid.boundary, device)
-        self._tolerance = min(self.fluid.pressure_tolerance, jump_tolerance)
+    def __init__(
+        self,
+        grid: Grid,
+        fluid: Fluid,
+        device: wp.Device,
+        jump_tolerance: float = 1.0,
+        fixed_tolerance: float = 1.0,
+    ):
+        super().__init__(grid, fluid, device, fixed_tolerance)
+        media = self._media
+        self.flow = StokesFlow(media.levels, (grid.width, grid.height), fluid.boundary, device)
+        self._tolerance = min(fluid.pressure_tolerance, jump_tolerance)
         self._still, self._load, self._last = (vector(self.layout, device, 2) for _ in range(3))
         self._swelling, self._left = (vector(self.layout, device, 2) for _ in range(2))
         self._prescribed = field(self.layout, device)
@@ -61,7 +67,8 @@ class CreepingStep(Step):
         numbers = Scalars(device, one=1.0, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
         self._one, self._inverse_h = numbers.one, [numbers.inverse_hx, numbers.inverse_hy]
         self._inner = InnerProduct(self.layout, device, 2)
-        self.keeps_pressure = False
+        self.keeps_pressure, self.transports_with_new_velocity = False, True
+        self._solves: tuple = ()
         self._scale_drags()
 
     @property
@@ -172,15 +179,8 @@ class CreepingStep(Step):
         """
         if of_viscosity:
             raise ValueError("a creeping fluid has no gradient with respect to its viscosity")
-        load_kernels(self.device, ADJOINT)
-        if self.pushed[0].grad is not None:
-            return  # captured graphs know the arrays by their addresses
-        attach_gradients([*self.pushed, *self._still, *self._load], self.layout, self.device)
-        self._media.allow_gradients()
-        self.feet.allow_gradients()
-        self.advection.allow_gradients()
-        for density in self.densities:
-            density.allow_gradients()
+        attach_gradients([*self._still, *self._load], self.layout, self.device)
+        super().allow_gradients()
 
     def _clear_gradients(self, state: State) -> None:
         """Set to 0 the gradients to which several stages add; the backward pass of a step begins with it."""
@@ -193,7 +193,6 @@ class CreepingStep(Step):
             return
         self.fluid = self._media.fluid = fluid
         self._media.invalidate()
-        self.keeps_pressure = False
         self._scale_drags()
 
     def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:

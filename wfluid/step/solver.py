@@ -23,8 +23,8 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
 from wfluid.solve.system import Residual
 from wfluid.step.forcing import Forcing
+from wfluid.step.inertial import InertialStep
 from wfluid.step.kinds import step_for
-from wfluid.step.step import Step
 
 REPLAYS_KEPT = 16
 """Number of captured steps that are kept; the one that was used least recently is dropped first."""
@@ -202,8 +202,14 @@ class Solver:
         step = self._ready(state_in, 0.0, dt)
         step.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
-    def _ready(self, state: State, t: float, dt: float) -> Step:
-        """The step, set up so that a single stage can run."""
+    def _ready(self, state: State, t: float, dt: float) -> InertialStep:
+        """The step, set up so that a single stage can run.
+
+        Raises:
+            TypeError: the fluid creeps, so that its step has no such stages.
+        """
+        if not isinstance(self._step, InertialStep):
+            raise TypeError("a creeping fluid neither diffuses nor projects a velocity; give it inertia")
         self._step.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
             self._step.update_coefficients(state)
