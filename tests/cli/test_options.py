@@ -201,6 +201,8 @@ FLAGS = {
     "--walls": ("periodic,no-slip", {"fluid": {"walls": "periodic,no-slip"}}),
     "--scheme": ("paper", {"fluid": {"scheme": "paper"}}),
     "--solver": ("jacobi", {"fluid": {"solver": "jacobi"}}),
+    "--creeping": ("", {"fluid": {"creeping": True}}),
+    "--no-creeping": ("", {"fluid": {"creeping": False}}),
     "--pressure-cycles": ("4", {"fluid": {"pressure_cycles": 4}}),
     "--diffusion-tolerance": ("1e-3", {"fluid": {"diffusion_tolerance": 1e-3}}),
     "--diffusion-loss": ("0.5", {"fluid": {"diffusion_loss": 0.5}}),

@@ -318,6 +318,7 @@ def _others():
         ("[fluid]", "walls", "periodic,no-slip", get("fluid.walls.y.value"), "no-slip"),
         ("[fluid]", "scheme", "paper", get("fluid.scheme"), "paper"),
         ("[fluid]", "solver", "jacobi", get("fluid.solver"), "jacobi"),
+        ("[fluid]", "creeping", True, get("fluid.inertia"), False),
         ("[fluid]", "pressure_cycles", 5, get("fluid.pressure_cycles"), 5),
         ("[fluid]", "diffusion_tolerance", 1e-3, get("fluid.diffusion_tolerance"), 1e-3),
         ("[fluid]", "diffusion_loss", 0.3, get("fluid.diffusion_loss"), 0.3 / 60),

@@ -136,14 +136,14 @@ def match_keyframes(
     tries += [] if free else [(factor, ()) for factor in factors]
     graphs = GraphCache()
     if not (animation.fluid.inertia or free):
-        attempt = Spline(animation, particles, tolerance, seed, log)
-        stopped = False
-        if not _all_stay(particles):
+        spline, tries, stopped = Spline(animation, particles, tuple(start), tolerance, seed, log), [], False
+        best = _measured(spline, False, log, began) if start or _all_stay(particles) else None
+        if best is None or best.status != REACHED:
             try:
-                attempt.run()
+                spline.run()
             except Stopped:
                 stopped = True
-        best, tries = _measured(attempt, stopped, log, began), []
+            best = _measured(spline, stopped, log, began)
     for factor, before in tries:
         attempt = Attempt(animation, particles, free, before, tolerance, seed, factor, log, graphs)
         if (before or _all_stay(particles)) and (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +23,9 @@ flow it makes. Among forces with this cost a single arrow gets wide ones, crowde
 
 SLACK = 1e-6
 """Price of a misfit of weight 1, relative to the mean response: repeated corrections remove the misfit."""
+
+MOVABLE = 1e-3
+"""Least response of a point that can be moved, relative to the largest."""
 
 LEAST_VISCOSITY = 1e-9
 """Least viscosity that counts in the mean [longer side^2/s]."""
@@ -44,10 +48,17 @@ class Responses:
 
         Where no forces achieve that, for points that nearly touch, `weights` (2 points,) share the misfit.
         """
-        spread = np.linalg.solve(self.cost, moved.T)
-        gram = moved @ spread
-        slack = SLACK * np.trace(gram) / len(gram) / weights
-        return spread @ np.linalg.solve(gram + np.diag(slack), wanted)
+        rows = self.movable
+        spread = np.linalg.solve(self.cost, moved[rows].T)
+        gram = moved[rows] @ spread
+        slack = SLACK * np.trace(gram) / len(gram) / weights[rows]
+        return spread @ np.linalg.solve(gram + np.diag(slack), wanted[rows])
+
+    @cached_property
+    def movable(self) -> np.ndarray:
+        """Whether each point can be moved along x and y, (2 points,): not on a wall, nor in a frozen part."""
+        reach = np.abs(self.moved).max(axis=1)
+        return reach > MOVABLE * reach.max()
 
 
 class Probe:

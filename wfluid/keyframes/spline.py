@@ -22,21 +22,18 @@ from wfluid.domain.grid import Grid
 from wfluid.fields.state import State
 from wfluid.keyframes.keyframes import PointTarget
 from wfluid.keyframes.responses import Probe
-from wfluid.keyframes.search import Progress, SearchLog, Stopped
+from wfluid.keyframes.search import SPLINE, Progress, SearchLog, Stopped
 from wfluid.keyframes.ways import plan_ways, radii_of, window_edges
 from wfluid.model.force import Force, flatten
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 
-RADII = (0.12, 0.05, 0.02)
+RADII = (0.12, 0.04, 0.012)
 """Radii of the forces at every point [longer side]; the last is at most half the distance of two points."""
 
-LEAST_RADIUS = 0.008
-"""Least radius [longer side]."""
-
 CELLS_A_RADIUS = 2.0
-"""Cells of the coarse grid in the least radius."""
+"""Cells in the least radius, on the animation's grid and on the coarse one."""
 
 CORRECTIONS = 7
 """Most corrections of a window."""
@@ -47,9 +44,6 @@ NEAR = 0.1
 AIMED = 2
 """Most repetitions with destinations corrected by the residual of the map."""
 
-SPLINE = "spline"
-"""Stage of the progress."""
-
 
 class Spline:
     """Finds the forces of the gentlest flow; `run` fills `found`."""
@@ -58,6 +52,7 @@ class Spline:
         self,
         animation: Animation,
         particles: Sequence[PointTarget],
+        start: tuple[GaussianForce, ...],
         tolerance: float,
         seed: int,
         log: SearchLog,
@@ -67,10 +62,10 @@ class Spline:
         self.ways = plan_ways(particles, (grid.width, grid.height), seed)
         radii = radii_of(self.ways)
         self._edges = window_edges(self.ways, radii, timeline)
-        least = max(LEAST_RADIUS, min(RADII[-1], *radii))
-        self.radii = (*RADII[:-1], least)
+        least = max(CELLS_A_RADIUS / animation.cells, min(RADII[-1], *radii))
+        self.radii = (*(radius for radius in RADII[:-1] if radius > 1.5 * least), least)
         self.given: tuple[Force, ...] = flatten(animation.forces)
-        self.found: tuple[GaussianForce, ...] = ()
+        self.found = start
         self._points = np.array([particle.point for particle in particles])
         self._corrections: dict[int, np.ndarray] = {}
 
@@ -134,7 +129,8 @@ class Spline:
         for n in range(1 + CORRECTIONS):
             forces = self._forces(centers, vectors, first, last)
             misfit = self._taken(now, spare, forces, first, last).points - aims
-            worst = float(np.linalg.norm(misfit, axis=1).max())
+            movable = np.where(responses.movable.reshape(-1, 2), misfit, 0.0)
+            worst = float(np.linalg.norm(movable, axis=1).max())
             if worst < best[0]:
                 best = worst, vectors
             self._report(responses.cost, vectors, worst)

@@ -118,6 +118,12 @@ class FluidTable(SceneTable):
         otherwise="multigrid, with the scheme paper jacobi",
         flag="--solver",
     )
+    creeping: bool | None = key(
+        "without inertia: the velocity answers forces at once, and stops with them",
+        flag(),
+        otherwise="true for keyframes and morphs without forces of their own, else false",
+        flag="--creeping",
+    )
     pressure_cycles: int = key(
         "multigrid cycles per projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
     )

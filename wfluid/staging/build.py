@@ -172,11 +172,20 @@ class _Builder:
             return Fluid(
                 walls=fluid.walls,
                 scheme=fluid.scheme,
+                inertia=not self._creeping,
                 solver=fluid.solver,
                 pressure_cycles=fluid.pressure_cycles,
                 diffusion_tolerance=fluid.diffusion_tolerance,
                 **more,
             )
+
+    @property
+    def _creeping(self) -> bool:
+        """Whether the fluid creeps: by default for keyframes that no forces disturb."""
+        scene = self.scene
+        if scene.fluid.creeping is None:
+            return bool(scene.keyframes or scene.morph) and not scene.forces and scene.fluid.scheme != "paper"
+        return scene.fluid.creeping
 
     def _complete_fluid(self) -> Fluid:
         """The fluid with viscosity, freezing and densities."""

@@ -6,7 +6,7 @@
 This velocity carries points, densities and map over the step, by the same stages as in a fluid with inertia.
 Where forces end, the picture stops. The drag c limits the distance over which a force is felt: without it a
 force would move the picture up to its edges, and on periodic axes without limit. Drag that freezes counts as
-alpha / (1 + alpha / most), with `most` the largest that the grid shows, mu / (a tenth of a cell)^2.
+alpha / (1 + alpha / most), with `most` the largest that the grid shows, mu / (a quarter of a cell)^2.
 
 The forces' impulses I over a step h give the right-hand side (dt / h) I of `StokesFlow`, dt = 1 / c.
 """
@@ -38,10 +38,10 @@ from wfluid.step.tape import attach_gradients, bars, record
 LEAST_PART = 1e-6
 """Least viscosity that counts in the harmonic mean, as a part of the largest."""
 
-STILL_WITHIN = 0.1
+STILL_WITHIN = 0.25
 """Cells over which a velocity falls by the factor e inside a frozen part, at least: a larger drag makes no
 difference that shows, but more iterations. A push of 48 px in a hole of 50 px in a frozen picture of 512 px
-moves the frozen parts 20 px away by 0.3 px at 128 cells, 0.1 px at 256."""
+moves the frozen parts 20 px away by 0.9 px at 128 cells, 0.3 px at 256."""
 
 
 class CreepingStep(Step):

@@ -74,6 +74,11 @@ class Solver:
         self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
         self._pool = self._step.helpers()
 
+    @property
+    def transports_with_new_velocity(self) -> bool:
+        """Whether a step moves the picture along the velocity after it; else along the one before it."""
+        return self._step.transports_with_new_velocity
+
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
         """A new state: fluid at rest, undistorted picture, initial densities.
 
