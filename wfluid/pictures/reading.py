@@ -15,8 +15,15 @@ import numpy as np
 from wfluid.domain.limits import TYPES
 from wfluid.pictures.formats import LINEAR, PictureError, first_line
 from wfluid.pictures.profiles import Profile, read_profile
-from wfluid.pictures.refusals import check_size, message_of, own_limits, refusal
-from wfluid.system.memory import free_memory, readable_size
+from wfluid.pictures.refusals import (
+    check_jpeg2000,
+    check_memory,
+    check_size,
+    message_of,
+    own_limits,
+    refusal,
+)
+from wfluid.system.memory import free_memory
 from wfluid.system.quiet import quiet_libraries
 
 STRAIGHT = ("jpeg2000", "jpegxl", "bmp", "gif", "dds", "dpx")
@@ -75,20 +82,22 @@ def read_stored(path: Path, colorspace: str) -> Stored:
         raise PictureError(f"{path}: {why}")
     if path.stat().st_size == 0:
         raise PictureError(f"{path}: the file is empty")
+    memory = free_memory()
+    check_jpeg2000(path, memory)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     notes: list[str] = []
-    with quiet_libraries(), own_limits(oiio):
+    with quiet_libraries(), own_limits(oiio, memory):
         source = oiio.ImageInput.open(str(path), hints)
         if source is None:
-            raise refusal(path, message_of(oiio))
+            raise refusal(path, message_of(oiio), memory)
         try:
             page = _page(source.format_name(), oiio.ImageInput.open(str(path)), notes)
             source.seek_subimage(page, 0)
             if source.format_name() == "png" and _is_animated(path):
                 notes.append(_FIRST)
             spec = source.spec()
-            _check(path, source.format_name(), spec)
+            _check(path, source.format_name(), spec, memory)
             dtype = _type_of(str(spec.format))
             raw = _raw_channels(source.format_name(), spec) if colorspace in ("auto", "data") else []
             stored = source.read_image(page, 0, 0, spec.nchannels, dtype)
@@ -151,7 +160,7 @@ def _is_animated(png: Path) -> bool:
         return b"acTL" in file.read(1 << 16).partition(b"IDAT")[0]
 
 
-def _check(path: Path, kind: str, spec: Any) -> None:
+def _check(path: Path, kind: str, spec: Any, memory: int) -> None:
     """Check kind and size of a picture before memory is allocated.
 
     Raises:
@@ -162,12 +171,7 @@ def _check(path: Path, kind: str, spec: Any) -> None:
     if spec.deep:
         raise PictureError(f"{path}: a deep picture, with samples in depth; flatten it first")
     check_size(path, (spec.width, spec.height, spec.depth), spec.nchannels)
-    need, there = 12 * spec.width * spec.height * max(spec.nchannels, 1), free_memory()
-    if need > there:
-        raise PictureError(
-            f"{path}: {spec.width} x {spec.height} pixels need about {readable_size(need)} of memory, "
-            f"{readable_size(there)} are free; make the picture smaller first"
-        )
+    check_memory(path, (spec.width, spec.height), spec.nchannels, memory)
 
 
 def _type_of(format_name: str) -> str:
