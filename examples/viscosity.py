@@ -31,7 +31,10 @@ def animations(duration=4.0, fps=15.0, cells=192, width=300, device=None):
     force = Drawing(picture.width, picture.height, max(duration, 1.0)).force(parse_force("push", PUSH))
     timeline = Timeline(duration, fps)
     size = {"cells": cells, "width": width, "height": width, "device": device}
-    return [Animation(picture, Fluid(viscosity=mu), (force,), timeline, **size) for mu in VISCOSITIES]
+    return [
+        Animation(picture, Fluid(viscosity=mu, diffusion_tolerance=1e-3), (force,), timeline, **size)
+        for mu in VISCOSITIES
+    ]
 
 
 def side_by_side(frames):

@@ -3,8 +3,13 @@
     q = -A p,  length = -rz / <p, q>,  x += length p,  r += length q
     z = M r,  rz' = <r, z>,  ratio = rz' / rz,  p = z + ratio p
 
-rz = <r, M r> is the squared error in the norm of A, <e, A e>, to the degree that M approximates A^-1. The
-loop runs while rz is above a limit. J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., algorithm 5.3.
+rz = <r, M r> is the squared error in the norm of A, <e, A e>, to the degree that M approximates A^-1. Stiff
+patches move as rigid bodies that M hardly corrects: eigenvalues of M A down to 0.03, which the loop finds
+last. There rz is up to 100 times too small. 1 / (the longest length so far) estimates the least eigenvalue,
+so rz * longest estimates <e, A e>, within a factor of about 4 also for those.
+
+The loop runs while rz is above a limit relative to the solution, or the estimate above an absolute one.
+J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., algorithm 5.3.
 
 x, r and p are updated in place, each entry from its old value.
 """
@@ -15,6 +20,9 @@ from wfluid.kernels.cell.program import cells, lines
 from wfluid.kernels.cell.real import Field, Indices, Real, Uniform
 from wfluid.kernels.solve.sums import total_of
 
+ERROR_FLOOR = Real(1e-10)
+"""Least absolute limit, relative to the sum of `scale_rows`: rounding in single precision."""
+
 
 @lines
 def begin(
@@ -23,21 +31,27 @@ def begin(
     scale_rows: Field,
     count: int,
     tolerance: Real,
+    error: Field,
     most: int,
     # outputs
     rz: Field,
     limit: Field,
+    error_limit: Field,
+    longest: Field,
     going: Indices,
     iterations: Indices,
 ):
-    """rz of the first residual, and its limit: tolerance^2 times the lesser of rz and the sum of
-    `scale_rows`.
+    """rz of the first residual, and its limits: tolerance^2 times the lesser of rz and the sum of
+    `scale_rows`; and `error`, the squared error allowed in the norm of A.
     """
     first = total_of(residual_rows, count)
+    scale = total_of(scale_rows, count)
     rz[0] = first
-    limit[0] = tolerance * tolerance * wp.min(first, total_of(scale_rows, count))
+    limit[0] = tolerance * tolerance * wp.min(first, scale)
+    error_limit[0] = wp.max(error[0], ERROR_FLOOR * scale)
+    longest[0] = Real(1.0)
     iterations[0] = 0
-    going[0] = int(first > limit[0] and most > 0)
+    going[0] = int((first > limit[0] or first > error_limit[0]) and most > 0)
 
 
 @lines
@@ -62,19 +76,26 @@ def measure_ratio(
     rows: Field,
     count: int,
     limit: Field,
+    error_limit: Field,
+    length: Field,
     most: int,
     # outputs
     rz: Field,
     ratio: Field,
+    longest: Field,
     going: Indices,
     iterations: Indices,
 ):
-    """ratio = rz' / rz; going = 1 while rz' is above the limit and fewer than `most` iterations have run."""
+    """ratio = rz' / rz; going = 1 while an error is above its limit and fewer than `most` iterations have
+    run.
+    """
     new = total_of(rows, count)
     ratio[0] = new / rz[0]
     rz[0] = new
+    longest[0] = wp.max(longest[0], length[0])
     iterations[0] = iterations[0] + 1
-    going[0] = int(new > limit[0] and iterations[0] < most)
+    left = new > limit[0] or new * longest[0] > error_limit[0]
+    going[0] = int(left and iterations[0] < most)
 
 
 @cells

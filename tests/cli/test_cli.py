@@ -17,7 +17,8 @@ from wfluid.pictures.stills import write_picture
 IMAGES = Path(__file__).parents[2] / "examples" / "images"
 REPORT = {
     "picture", "grid", "frames", "fps", "steps", "seconds", "divergence_max", "jacobian_min", "jacobian_max",
-    "displacement_max_px", "displacement_mean_px", "outside_fraction", "versions", "device",
+    "displacement_max_px", "displacement_mean_px", "outside_fraction", "diffusion_loss_px", "versions",
+    "device",
 }  # fmt: skip
 
 

@@ -273,6 +273,19 @@ def test_a_viscosity_that_needs_another_solve_is_captured_again(device, name):
     assert_same(used.value_and_gradient(thick), found)
 
 
+@pytest.mark.float64
+@pytest.mark.parametrize("walls", ["free-slip", "no-slip"])
+@pytest.mark.parametrize("viscosity", [0.003, 0.1])
+def test_a_free_number_has_its_gradient_at_any_tolerance_that_is_allowed(device, walls, viscosity):
+    """That of the function itself: the rates of sweeps and cycles change with the viscosity."""
+    fluid = {"viscosity": viscosity, "walls": walls, "diffusion_tolerance": 1e-4}
+    functional = Case([PUSH], PARTICLES, ["fluid.viscosity"], fluid, begin()).functional(device)
+    m, step = functional.start, 1e-4
+    _, slope = functional.value_and_gradient(m)
+    difference = (functional.value(m + step) - functional.value(m - step)) / (2 * step)
+    assert slope[0] == pytest.approx(difference, rel=3e-6)
+
+
 LARGE = Grid(70, 52, 1.0, 0.7)
 """Rows enough to be shared."""
 

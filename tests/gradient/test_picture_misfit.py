@@ -24,7 +24,7 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.model.painted import Painted
 from wfluid.pictures.picture import Picture
-from wfluid.step.step import Step
+from wfluid.step.inertial import InertialStep
 from wfluid.system.threads import free_cores, helpers
 from wfluid.view.lookup import LookUp
 from wfluid.view.lookup_adjoint import LookUpAdjoint
@@ -112,7 +112,7 @@ def test_the_value_is_that_of_the_rendered_frame(device, name):
     animation = Animation(
         picture, fluid, [], Timeline(1), 24, target.width, target.height, **how, device=device.alias
     )
-    stages = Step(animation.grid, fluid, device)
+    stages = InertialStep(animation.grid, fluid, device)
     state = moved_state(device, animation.grid, fluid.walls)
     weight, factor = None, np.ones((target.height, target.width))
     if case["weight"]:
@@ -135,7 +135,7 @@ def test_the_value_does_not_depend_on_the_size_of_the_frame(device):
     state, values = moved_state(device, grid, fluid.walls), []
     for width, height in ((40, 58), (80, 29), (240, 174)):
         objective = PictureMisfit(smooth(240, 174), smooth(width, height, phase=1.0), 1.0)
-        term = objective.term(Step(grid, fluid, device), 1.0, slice(0, 0))
+        term = objective.term(InertialStep(grid, fluid, device), 1.0, slice(0, 0))
         term.measure(state)
         values.append(term.value())
     assert values == pytest.approx([values[-1]] * 3, rel=0.01)
@@ -145,7 +145,7 @@ def test_the_gradient_is_added_to_cells_and_no_ghost(device):
     """What is there stays, in ghosts and beside the map too; two calls give twice of one."""
     grid, fluid = Grid.for_picture(WIDTH, HEIGHT, 24), Fluid()
     term = PictureMisfit(smooth(40, 29), smooth(31, 40, phase=1.0), 1.0).term(
-        Step(grid, fluid, device), 1.0, slice(0, 0)
+        InertialStep(grid, fluid, device), 1.0, slice(0, 0)
     )
     state, bar = moved_state(device, grid, fluid.walls), State.at_rest(grid, device)
     term.adjoint(state, bar)
@@ -353,7 +353,7 @@ def test_two_threads_compute_the_bits_of_one(device):
         pytest.skip("strips are for CPU threads")
     grid, fluid = Grid(96, 72, 1.0, 0.75), Fluid()
     objective = PictureMisfit(noise(120, 90, 5), noise(150, 100, 5, seed=1), 1.0)
-    term = objective.term(Step(grid, fluid, device), 1.0, slice(0, 0))
+    term = objective.term(InertialStep(grid, fluid, device), 1.0, slice(0, 0))
     state = moved_state(device, grid, fluid.walls)
     still, bar, elsewhere = (State.at_rest(grid, device) for _ in range(3))
 

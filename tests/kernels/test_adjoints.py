@@ -34,7 +34,7 @@ from wfluid.solve.multigrid import Location
 from wfluid.step.diffusion import ScalarDiffusion
 from wfluid.step.forcing import Forcing
 from wfluid.step.gaussians import GaussianBatch, gaussian_impulse_of
-from wfluid.step.step import Step
+from wfluid.step.inertial import InertialStep
 from wfluid.step.tape import bars, recording
 
 pytestmark = pytest.mark.float64
@@ -184,7 +184,7 @@ def test_scatter_adds_what_numpy_adds(device, kind, size, places):
 
 def projecting(device, walls="free-slip", **fluid):
     """A step of DT, ready."""
-    step = Step(GRID, Fluid(walls=walls, **fluid), device)
+    step = InertialStep(GRID, Fluid(walls=walls, **fluid), device)
     step.plan(DT, DT, step.update_coefficients)
     step.allow_gradients()
     return step
@@ -370,7 +370,7 @@ ADVECTIONS = {
 @pytest.mark.parametrize("scheme", ADVECTIONS)
 def test_what_is_carried_from_fixed_feet_is_scattered_back(device, scheme, walls, largest):
     """Both components of the velocity, and of the displacement, whose foot is a summand beside."""
-    step = Step(GRID, Fluid(scheme=scheme, walls=walls), device)
+    step = InertialStep(GRID, Fluid(scheme=scheme, walls=walls), device)
     advect, carry, scattered = ADVECTIONS[scheme]
     foot, pitch = feet(step, 3, largest), LAYOUT.pitch
     place = (wp.zeros(LAYOUT.size, dtype=wp.int32, device=device), *vector(LAYOUT, device, 2))
@@ -406,7 +406,7 @@ def test_a_densitys_transport_is_transposed(device, walls, limited):
     that of the linear map, with the rounding of values of about 20: 20 eps / small = 5e-12, at random 400
     times.
     """
-    step = Step(GRID, Fluid(walls=walls, densities=[Density()]), device)
+    step = InertialStep(GRID, Fluid(walls=walls, densities=[Density()]), device)
     ghosts, small = Ghosts(LAYOUT, step.fluid.walls.centre_rules(), device), 2.0**-10
     rng = np.random.default_rng(7)
     j, i = np.mgrid[:18, :23]
@@ -439,7 +439,7 @@ def test_a_densitys_transport_is_transposed(device, walls, limited):
 @pytest.mark.parametrize("walls", WALLS)
 def test_means_of_faces_at_centres_are_transposed(device, walls):
     """The Euler trace of a velocity too slow to reach a wall, -dt v at centres, is linear."""
-    step = Step(GRID, Fluid(scheme="paper", walls=walls), device)
+    step = InertialStep(GRID, Fluid(scheme="paper", walls=walls), device)
     impulses = Forcing((), step.fluid, GRID, device)
     impulses.set((), step.fluid, 0.0, DT, DT)
     x = noise(LAYOUT, device, 2, 1, *step.velocity_ghosts)

@@ -81,6 +81,8 @@ def default_of(key):
     values = [{"true": True, "false": False}.get(text, text)]
     if text.endswith("% of the longer side"):
         values = [float(text.split()[0]) / 100 * 60]
+    elif text.endswith("for a picture of 512 px"):
+        values = [float(text.split()[0]) / 512 * 60]
     elif text[:1].isdigit():
         values = [int(text) if text.isdigit() else float(text)]
     elif " " in text or "'" in text:

@@ -73,6 +73,25 @@ def test_a_gaussian_spreads_as_the_root_of_two_kappa_t(make_solver):
         assert variance(rho) - variance(start) == pytest.approx(2 * kappa * 0.9, rel=2e-3), axis
 
 
+@pytest.mark.parametrize(
+    ("kappa", "dt", "method"),
+    [(1e-3, 1 / 96, "chebyshev"), (1e-2, 1 / 96, "chebyshev"), (1e-2, 1 / 24, "multigrid")],
+)
+def test_a_gaussian_spreads_so_at_the_usual_tolerance(make_solver, kappa, dt, method):
+    """The tolerance leaves no error of one sign in every step: not in the smoothest change."""
+    grid, steps = Grid(96, 96, 1.0, 1.0), 12
+    start = blob(grid, (0.5, 0.45), 0.04)
+    solver = make_solver(96, 96, grid=grid, densities=[Density(diffusion=kappa, initial=Painted(start))])
+    rho = run(solver, [], steps, dt).densities[0]
+    assert solver._step.densities[0].plan(dt).name == method
+    for axis, x in enumerate(centres(grid)):
+        grown = sum(
+            sign * ((f * x**2).sum() / f.sum() - ((f * x).sum() / f.sum()) ** 2)
+            for sign, f in ((1, rho), (-1, start))
+        )
+        assert grown == pytest.approx(2 * kappa * steps * dt, rel=5e-4), axis
+
+
 def test_transport_has_the_order_of_its_interpolation(make_solver):
     """A wave goes once round a periodic picture at one CFL number.
 

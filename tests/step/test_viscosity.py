@@ -8,7 +8,7 @@ from viscous_media import MEDIA, WALLS, centres, coupled, disc, media, random_ve
 from wfluid import Freeze, GaussianForce, Instantaneous, Keyed, Painted
 from wfluid.domain.grid import Grid
 from wfluid.fields.arrays import from_numpy, to_numpy, vector
-from wfluid.step.step import Step
+from wfluid.step.inertial import InertialStep
 
 
 def steady(make_solver, ny, force_rows):
@@ -231,7 +231,7 @@ def test_a_viscosity_function_of_constant_value_gives_the_flow_of_a_painted_one(
 
     But for the pressure kept from step to step, which only a still one may keep.
     """
-    monkeypatch.setattr(Step, "pressure_part", lambda self, *last: 0.0)
+    monkeypatch.setattr(InertialStep, "pressure_part", lambda self, *last: 0.0)
     mu = np.random.default_rng(1).random((24, 32)) * 0.05
     force = GaussianForce((0.5, 0.4), (1.0, 0.5), 0.1)
     ends = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -15,7 +15,7 @@ from wfluid.fields.arrays import copy
 from wfluid.fields.state import State
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
-from wfluid.solve.system import conjugate_gradients
+from wfluid.step.diffusion import ERROR_TIME, MARGIN
 from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver, SolveReport
 
@@ -66,12 +66,15 @@ class Simulation:
         def advance(state_in: State, state_out: State, step: int) -> None:
             (take if step else take_first)(state_in, state_out, step)
 
+        errors = 0.0  # of the velocity, summed over the steps [longer side/s]
         steps = march(self.now, self.spare, range(frames * per_frame), advance)
         for index in range(1, frames + 1):
             for self.now, self.spare in islice(steps, per_frame):
                 pass  # to the next frame
-            solve = self.solver.report()
-            self._warned = _judge(solve, self.solver.fluid, index, self._warned)
+            solve, t = self.solver.report(), self.timeline.time_of(index * per_frame)
+            errors += per_frame * solve.diffusion.error
+            solve = replace(solve, map_loss=min(ERROR_TIME, t / 2) * errors)
+            self._warned = _judge(solve, self.solver.fluid, index, t, self._warned)
             yield SimulatedFrame(self.now, solve)
 
     def untouch(self) -> None:
@@ -81,7 +84,7 @@ class Simulation:
             copy(untouched, array)
 
 
-def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
+def _judge(solve: SolveReport, fluid: Fluid, index: int, t: float, warned: bool) -> bool:
     """Stop where the fluid is not finite; warn once of a solve with a large residual."""
     pressure = solve.pressure
     if not math.isfinite(pressure.norm + pressure.norm_b + solve.divergence):
@@ -90,13 +93,13 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, warned: bool) -> bool:
         )
     if warned:
         return warned
-    text = _poor(solve, fluid)
+    text = _poor(solve, fluid, t)
     if text:
         warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
     return bool(text)
 
 
-def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
+def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
     """A warning of a large residual, with the remedy; None if there is none."""
     pressure, diffusion = solve.pressure, solve.diffusion
     if pressure.method == "jacobi":
@@ -107,13 +110,17 @@ def _poor(solve: SolveReport, fluid: Fluid) -> str | None:
             more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
             return f"{left} cycles; {more}"
         return f"{left} iterations; soften the edges of the freeze mask"
-    most = conjugate_gradients(fluid.diffusion_tolerance).iterations
-    if diffusion.method == "conjugate gradients" and diffusion.iterations == most:
+    if diffusion.unfinished:
         return (
             f"the diffusion left {diffusion.relative:.1e} of its change after "
             f"{diffusion.iterations} iterations; "
             "lower the contrast of the viscosity, soften its edges, or use more substeps"
         )
+    excess = solve.map_loss / (fluid.diffusion_loss * max(1.0, t))
+    if excess > MARGIN:
+        left = f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side"
+        less = fluid.diffusion_tolerance / excess
+        return f"{left}; set diffusion_tolerance (--diffusion-tolerance) to {less:.1e}"
     return None
 
 

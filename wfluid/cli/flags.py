@@ -123,7 +123,8 @@ def _add_key_flag(group: Any, flag: str, key: Key) -> None:
     default = f" ({key.shown_default})" if key.shown_default and key.kind.read is not bool else ""
     text = f"{key.meaning}{words}{unit}{default}".replace("%", "%%")
     if key.kind.read is bool:
-        group.add_argument(flag, action="store_true", default=None, help=text)
+        both = argparse.BooleanOptionalAction if key.default is None else "store_true"
+        group.add_argument(flag, action=both, default=None, help=text)
     else:
         type_ = key.kind.read if key.kind.read in (int, float) else str
         group.add_argument(flag, type=type_, metavar=key.metavar, dest=flag_name(flag), help=text)

@@ -9,7 +9,7 @@ from typing import TextIO
 
 from wfluid.keyframes.search import Progress
 
-STAGES = {"march": "first guess", "coarse": "coarse grid", "fine": "fine grid"}
+STAGES = {"spline": "gentlest flow", "march": "first guess", "coarse": "coarse grid", "fine": "fine grid"}
 """Names of the stages of a search."""
 
 

@@ -47,6 +47,7 @@ class Report:
             "outside_fraction": 0.0,
             "divergence_prescribed_max": 0.0,
             "divergence_removed_max": 0.0,
+            "diffusion_loss_px": 0.0,
         }
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
@@ -69,6 +70,7 @@ class Report:
             ("divergence_max", frame.solve.divergence if frame.solve else 0.0),
             ("divergence_prescribed_max", frame.solve.prescribed if frame.solve else 0.0),
             ("divergence_removed_max", abs(frame.solve.removed) if frame.solve else 0.0),
+            ("diffusion_loss_px", frame.solve.map_loss * side if frame.solve else 0.0),
         ):
             seen[name] = max(seen[name], value)
         if isinstance(frame, MorphFrame) and frame.to_quality:

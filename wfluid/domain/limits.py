@@ -64,6 +64,15 @@ MORPH_VISCOSITY = 0.03
 """Default viscosity of morphs [longer side^2/s]: high, so that the neighbourhood of a point moves with it and
 features keep their shape."""
 
+CREEPING_REACH = 0.3
+"""Distance over which a force is felt in a creeping fluid [longer side]."""
+
+DIFFUSION_TOLERANCE = 7e-3
+"""Default relative error of the viscous change of a step."""
+
+DIFFUSION_LOSS = 0.1 / 512
+"""Default of what the map may lose in a second by the diffusion's solves [longer side]: 0.1 px of 512."""
+
 VISCOSITY_LIMIT = 1e3
 """Largest viscosity that the solver is tested with [longer side^2/s]."""
 

@@ -21,7 +21,8 @@ So the gradient is that of the discretised simulation, walls included, and costs
 number of free numbers. It is exact to rounding where the solves are cycles or sweeps, which are their own
 transposes. Where viscosity or drag jump, the solves are conjugate gradients, which are their own transposes
 up to their tolerance; it is lowered here to `JUMP_TOLERANCE`. With respect to viscosity the gradient is as
-accurate as the diffusion's solve.
+accurate as the diffusion's solve; where it is free or moves, the tolerance of sweeps and cycles is lowered
+here to `FIXED_TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -47,10 +48,13 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, LocalForce, flatten
 from wfluid.step.diffusion import SURE_TOLERANCE
 from wfluid.step.gaussians import gaussian_impulse_of
-from wfluid.step.step import Step
+from wfluid.step.kinds import step_for
 
 JUMP_TOLERANCE = {"float32": 1e-4, "float64": 1e-9}[Real.__name__]
 """Largest tolerance of conjugate gradients, a relative residual."""
+
+FIXED_TOLERANCE = {"float32": 1e-5, "float64": 1e-9}[Real.__name__]
+"""Largest tolerance of sweeps and cycles, whose rates change with viscosity, where that is free or moves."""
 
 ROUNDING = 1e-6
 """Distance outside the picture that counts as rounding, for a point on its edge [longer side]."""
@@ -146,7 +150,10 @@ class Functional:
             if self._first == self._last:
                 raise ValueError(f"a beginning at {start:g} s: expected a time before the end")
         cached = graphs.find(grid, timeline, fluid) if graphs else None
-        step = cached.step if cached else Step(grid, fluid, open_device(device), JUMP_TOLERANCE)
+        fixed = FIXED_TOLERANCE if of_viscosity or fluid.viscosity_moves else 1.0
+        if cached and cached.step.fixed_tolerance != fixed:
+            cached = None
+        step = cached.step if cached else step_for(grid, fluid, open_device(device), JUMP_TOLERANCE, fixed)
         self._particles: list[tuple[float, ParticleObjective, slice]] = []
         terms: dict[int, list[DeviceObjective]] = {}
         # in the graphs effort has weight 1, so that they can be reused: other weights are relative to it

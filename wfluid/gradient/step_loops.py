@@ -29,7 +29,7 @@ class WorkingStates:
     """The states before and after the step that a loop is at, and the gradients with respect to them."""
 
     def __init__(self, step: Step, points: int):
-        self._with_pressure = step.projection.accumulates_pressure
+        self._with_pressure = step.keeps_pressure
         self.before, self.after, self.bar, self.after_bar = (
             State.at_rest(step.grid, step.device, len(step.densities), points) for _ in range(WORKING_STATES)
         )
@@ -162,7 +162,7 @@ class StepLoops:
         self._read_numbers()
         for table, f in zip(self.states, states.stored(states.before), strict=True):
             table.take(counter, f)
-        if self.step.paper:  # its transport reads the velocity after the step
+        if self.step.transports_with_new_velocity:
             for table, f in zip(self.states, (states.after.u, states.after.v), strict=False):
                 table.take(counter, f, ahead=1)
         for table, p_bar in zip(self.particle_bars, states.after_bar.particles, strict=True):

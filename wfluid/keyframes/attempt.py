@@ -158,14 +158,7 @@ class Attempt:
                         place = particle.destinations[steps.index(step)]
                         residual = warp.source_at(place[None])[0] - particle.point
                         missed = max(missed, float(np.linalg.norm(residual)))
-                        by[n] += 0.5 * np.linalg.solve(_slope(warp, place), residual)
+                        by[n] += 0.5 * np.linalg.solve(warp.slope_at(place), residual)
             if missed <= self.tolerance:
                 return
             search.settle(FINE, level, corrections=corrections)
-
-
-def _slope(warp: CoordinateMap, place: np.ndarray) -> np.ndarray:
-    """The Jacobian of a map at a place, (2, 2), a row per component of the source; one-sided at edges."""
-    grid, step = warp.grid, np.diag([warp.grid.hx, warp.grid.hy])
-    ahead, behind = (np.clip(place + by, 0.0, (grid.width, grid.height)) for by in (step, -step))
-    return ((warp.source_at(ahead) - warp.source_at(behind)) / np.diag(ahead - behind)[:, None]).T

@@ -33,6 +33,7 @@ from wfluid.keyframes.arrival import Arrival, reason_unreached
 from wfluid.keyframes.attempt import Attempt
 from wfluid.keyframes.keyframes import ParticleKeyframe, PointTarget, targets_of
 from wfluid.keyframes.search import Progress, SearchLog, Stopped
+from wfluid.keyframes.spline import Spline
 from wfluid.keyframes.trajectories import trajectories
 from wfluid.model.fluid import Fluid
 from wfluid.model.gaussian_forces import GaussianForce
@@ -134,6 +135,15 @@ def match_keyframes(
     tries = [(factors[0], tuple(start))] if free or start else []
     tries += [] if free else [(factor, ()) for factor in factors]
     graphs = GraphCache()
+    if not (animation.fluid.inertia or free):
+        spline, tries, stopped = Spline(animation, particles, tuple(start), tolerance, seed, log), [], False
+        best = _measured(spline, False, log, began) if start or _all_stay(particles) else None
+        if best is None or best.status != REACHED:
+            try:
+                spline.run()
+            except Stopped:
+                stopped = True
+            best = _measured(spline, stopped, log, began)
     for factor, before in tries:
         attempt = Attempt(animation, particles, free, before, tolerance, seed, factor, log, graphs)
         if (before or _all_stay(particles)) and (
@@ -201,7 +211,7 @@ def _check_step(t: float, timeline: Timeline) -> None:
         raise ValueError(f"a keyframe at {t:g} s falls between two steps, at {near} s")
 
 
-def _measured(attempt: Attempt, stopped: bool, log: SearchLog, began: float) -> Match:
+def _measured(attempt: Attempt | Spline, stopped: bool, log: SearchLog, began: float) -> Match:
     """Run the animation with the forces of an attempt and measure the residuals of its keyframes."""
     animation, particles = attempt.animation, attempt.particles
     given, found = attempt.given, attempt.found

@@ -23,7 +23,7 @@ from wfluid.domain.paths import Place
 from wfluid.files.names import check_folder
 from wfluid.keyframes.arrival import Arrival
 from wfluid.keyframes.match import Match
-from wfluid.keyframes.search import COARSE, FINE, MARCH
+from wfluid.keyframes.search import COARSE, FINE, MARCH, SPLINE
 from wfluid.pictures.fitting import display_rgb
 from wfluid.pictures.picture import Picture
 from wfluid.system.atomic import atomic_write
@@ -49,7 +49,7 @@ _LEFT, _GAP, _RIGHT, _TOP, _BOTTOM = 0.55, 0.55, 0.7, 0.62, 0.95  # around them 
 
 _INK, _GREY, _MISFIT, _OBJECTIVE = "#1a1a1a", "#666666", "#0050c8", "#c05000"
 _ARROW, _TRACK, _REACHED, _PIN = "#ffb000", "#00b4ff", "#0050c8", "#ff2d78"
-_TINTS = {MARCH: "#e4e9f0", COARSE: "#e6dcf3", FINE: "#dff0e4"}
+_TINTS = {SPLINE: "#dff0e4", MARCH: "#e4e9f0", COARSE: "#e6dcf3", FINE: "#dff0e4"}
 
 _STYLE = {
     "font.family": "DejaVu Sans",

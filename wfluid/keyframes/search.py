@@ -40,6 +40,9 @@ from wfluid.optimize.settings import Settings
 MARCH, COARSE, FINE = "march", "coarse", "fine"
 """Stages of a search."""
 
+SPLINE = "spline"
+"""The stage of a creeping fluid's keyframes (`spline`)."""
+
 MARCH_WEIGHT, WEIGHT = 1e-3, 1e-4
 """Weight of effort and smoothness: in the march, and then to begin with."""
 
@@ -73,7 +76,7 @@ class Progress:
     """Progress of a search."""
 
     stage: str
-    """"march", "coarse" or "fine"."""
+    """"march", "coarse", "fine" or "spline"."""
     iteration: int
     """Iterations so far, of all stages."""
     evaluations: int

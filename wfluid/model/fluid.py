@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wfluid.domain.checks import check_word
-from wfluid.domain.limits import CYCLES, SCHEMES, SOLVERS, VISCOSITY
+from wfluid.domain.limits import CYCLES, DIFFUSION_LOSS, DIFFUSION_TOLERANCE, SCHEMES, SOLVERS, VISCOSITY
 from wfluid.domain.walls import Wall, Walls
 from wfluid.model.densities import Density
 from wfluid.model.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
@@ -31,6 +31,10 @@ class Fluid:
     """Whether a painted viscosity moves with the picture; otherwise it stays in place."""
     freeze: Freeze | None = None
     """Mask that holds parts of the picture in place."""
+    inertia: bool = True
+    """Whether the fluid keeps its velocity when forces end. Without inertia it creeps: the velocity answers
+    forces at once, as the Stokes flow that dissipates least, and only ratios of viscosities matter to how it
+    deforms the picture."""
     densities: Sequence[Density] = ()
     """Densities such as ink and smoke, with different names."""
     walls: Walls | str = field(default_factory=Walls)
@@ -45,9 +49,13 @@ class Fluid:
     """"multigrid" (default of the standard scheme) or "jacobi" (default of the paper's)."""
     pressure_cycles: int = CYCLES
     """Multigrid cycles per projection: 3 cycles leave 3e-4 of the divergence, 4 leave 1.4e-5."""
-    diffusion_tolerance: float = 7e-3
-    """Relative error of the viscous change of a step, 1e-14 … 0.5. Chebyshev sweeps are used if few suffice,
-    otherwise two or more multigrid cycles."""
+    diffusion_tolerance: float = DIFFUSION_TOLERANCE
+    """Largest relative error of the viscous change of a step, 1e-14 … 0.5. Chebyshev sweeps are used if few
+    suffice, otherwise two or more multigrid cycles, or conjugate gradients beside stiff paint."""
+    diffusion_loss: float = DIFFUSION_LOSS
+    """How far places of the map may be off after a second of the run by the solves of the diffusion [longer
+    side], 1e-9 … 1. Conjugate gradients run until their estimated error allows it; a value below the default
+    lowers `diffusion_tolerance` in proportion for sweeps and cycles."""
     pressure_tolerance: float = 5e-4
     """Relative residual of a projection with discontinuous drag, 1e-14 … 0.5; such projections are solved to
     this tolerance, and `pressure_cycles` does not apply."""
@@ -71,6 +79,8 @@ class Fluid:
                 f"densities {', '.join(self.density_names)}: two have one name; give each its own"
             )
         check_word("scheme", self.scheme, SCHEMES)
+        if not self.inertia and self.scheme == "paper":
+            raise ValueError("scheme paper: its fluid has inertia; leave out the scheme or inertia=False")
         default = "jacobi" if self.scheme == "paper" else "multigrid"
         solver = default if self.solver is None else self.solver
         check_word("solver", solver, SOLVERS)
@@ -81,6 +91,8 @@ class Fluid:
         for name in ("diffusion_tolerance", "pressure_tolerance"):
             if not 1e-14 <= getattr(self, name) <= 0.5:
                 raise ValueError(f"{name} {getattr(self, name)}: expected 1e-14 … 0.5")
+        if not 1e-9 <= self.diffusion_loss <= 1:
+            raise ValueError(f"diffusion_loss {self.diffusion_loss}: expected 1e-9 … 1")
 
     @property
     def density_names(self) -> tuple[str, ...]:
@@ -101,9 +113,9 @@ class Fluid:
     def separable(self) -> bool:
         """Whether the components of the velocity diffuse independently, with one constant viscosity.
 
-        With no-slip walls only the paper's scheme treats them so.
+        With no-slip walls only the paper's scheme treats them so; without inertia none does.
         """
         walls = self.boundary
         if self.scheme == "paper":
             return self.uniform
-        return self.uniform and Wall.NO_SLIP not in (walls.x, walls.y)
+        return self.uniform and self.inertia and Wall.NO_SLIP not in (walls.x, walls.y)

@@ -78,8 +78,9 @@ def flow_maps(solver: Solver, forces: Sequence[Force], timeline: Timeline) -> Fl
     forward = steps_of(solver, timeline, forces)
 
     def there(now: State, then: State, step: int) -> None:
-        velocities.append([clone(f) for f in (now.u, now.v)])
         forward(now, then, step)
+        mover = then if solver.transports_with_new_velocity else now
+        velocities.append([clone(f) for f in (mover.u, mover.v)])
 
     def back(now: State, then: State, step: int) -> None:
         for f, kept in zip((now.u, now.v), velocities.pop(), strict=True):

@@ -241,7 +241,7 @@ def morph(
         Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
     )
     pair = paired(a, b, fit)
-    fluid = Fluid(viscosity=MORPH_VISCOSITY) if fluid is None else fluid
+    fluid = Fluid(viscosity=MORPH_VISCOSITY, inertia=False) if fluid is None else fluid
     animation = Animation(a, fluid, [], FLOW, **settings)
     extent, side = (animation.grid.width, animation.grid.height), max(b.width, b.height)
     keyframes = [

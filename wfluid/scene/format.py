@@ -15,6 +15,8 @@ from wfluid.domain.limits import (
     COLORSPACES,
     CYCLES,
     CYCLES_LIMIT,
+    DIFFUSION_LOSS,
+    DIFFUSION_TOLERANCE,
     DRAG,
     DRAG_LIMIT,
     FIRST_FRAME,
@@ -116,8 +118,27 @@ class FluidTable(SceneTable):
         otherwise="multigrid, with the scheme paper jacobi",
         flag="--solver",
     )
+    creeping: bool | None = key(
+        "without inertia: the velocity answers forces at once, and stops with them",
+        flag(),
+        otherwise="true for keyframes and morphs without forces of their own, else false",
+        flag="--creeping",
+    )
     pressure_cycles: int = key(
         "multigrid cycles per projection", whole(1, CYCLES_LIMIT), default=CYCLES, flag="--pressure-cycles"
+    )
+    diffusion_tolerance: float = key(
+        "relative error of the change that viscosity makes in a step",
+        number(1e-14, 0.5),
+        default=DIFFUSION_TOLERANCE,
+        flag="--diffusion-tolerance",
+    )
+    diffusion_loss: float | None = key(
+        "how far places may be off after a second by the solves of the viscosity",
+        number(above=0),
+        unit="px",
+        otherwise=f"{512 * DIFFUSION_LOSS:g} for a picture of 512 px",
+        flag="--diffusion-loss",
     )
 
 

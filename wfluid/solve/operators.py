@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import warp as wp
 
 from wfluid.domain.walls import Walls
@@ -99,10 +101,22 @@ class FivePoint(Level):
         self.fill(out)
 
 
+class FaceCoefficients(Protocol):
+    """Coefficients on the faces of a grid."""
+
+    @property
+    def layout(self) -> Layout:
+        """Layout of the grid."""
+
+    @property
+    def beta(self) -> Vector:
+        """On x-faces and on y-faces, ghosts filled."""
+
+
 class VariablePoisson(Level):
     """The operator A q = -div (beta grad q) with beta on the faces: pressure with drag."""
 
-    def __init__(self, medium: CoefficientLevel, size: tuple[float, float], walls: Walls, device: wp.Device):
+    def __init__(self, medium: FaceCoefficients, size: tuple[float, float], walls: Walls, device: wp.Device):
         layout = medium.layout
         super().__init__(layout.nx, layout.ny, size, [Location(walls.centre_rules())], device)
         self.medium = medium

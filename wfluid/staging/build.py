@@ -172,10 +172,20 @@ class _Builder:
             return Fluid(
                 walls=fluid.walls,
                 scheme=fluid.scheme,
+                inertia=not self._creeping,
                 solver=fluid.solver,
                 pressure_cycles=fluid.pressure_cycles,
+                diffusion_tolerance=fluid.diffusion_tolerance,
                 **more,
             )
+
+    @property
+    def _creeping(self) -> bool:
+        """Whether the fluid creeps: by default for keyframes that no forces disturb."""
+        scene = self.scene
+        if scene.fluid.creeping is None:
+            return bool(scene.keyframes or scene.morph) and not scene.forces and scene.fluid.scheme != "paper"
+        return scene.fluid.creeping
 
     def _complete_fluid(self) -> Fluid:
         """The fluid with viscosity, freezing and densities."""
@@ -191,7 +201,13 @@ class _Builder:
             viscosity_moves=viscosity.moves,
             freeze=self.drawing.frozen,
             densities=densities,
+            **self._loss(),
         )
+
+    def _loss(self) -> dict[str, float]:
+        """`diffusion_loss` in longer sides, if the scene gives it in pixels."""
+        loss = self.scene.fluid.diffusion_loss
+        return {} if loss is None else {"diffusion_loss": loss / self.drawing.side}
 
     def _density(self, density: DensityTable) -> Density:
         name = f"density {density.name}"

@@ -36,8 +36,12 @@ class Stiffness:
     """A lower bound of the eigenvalues of M^-1 A, M the row sums of |A|."""
     greatest: float
     """An upper bound of the eigenvalues of A."""
+    least_row: float
+    """Least row sum of |A|."""
     jump: float
     """Largest ratio of row sums `REACH` cells apart."""
+    contrast: float
+    """Largest ratio of any two row sums."""
 
 
 class Coefficients:
@@ -69,8 +73,12 @@ class Coefficients:
         )
         self._largest_mu = np.zeros((grid.ny, grid.nx))
         self._several_times = False
-        self.alpha = fluid.freeze.sample(grid) if fluid.freeze else np.zeros((grid.ny, grid.nx))
-        from_numpy(self.alpha, top.alpha, top.layout)
+        self.set_drag(fluid.freeze.sample(grid) if fluid.freeze else np.zeros((grid.ny, grid.nx)))
+
+    def set_drag(self, alpha: np.ndarray) -> None:
+        """Set the drag [1/s] at centres, (ny, nx)."""
+        self.alpha, top = alpha, self.levels[0]
+        from_numpy(alpha, top.alpha, top.layout)
 
     def set_time(self, t: float, dt: float) -> bool:
         """Set the viscosity to that at time t, and the step to dt. Returns whether either has changed.
@@ -187,7 +195,9 @@ class Coefficients:
         return Stiffness(
             least=float(1 / (1 + per_mu * mu.max() / drag.min())),
             greatest=float(drag.max() + per_mu * mu.max()),
+            least_row=float(rows.min()),
             jump=_steepest(rows) if local else float(rows.max() / drag.min()),
+            contrast=float(rows.max() / (rows if local else drag).min()),
         )
 
     def drag_jump(self, dt: float) -> float:

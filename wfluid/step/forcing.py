@@ -14,7 +14,6 @@ from wfluid.domain.grid import Grid
 from wfluid.domain.timeline import STEP_LIMIT
 from wfluid.fields.arrays import Vector, assign, entries, field, from_numpy, read, vector, zeros
 from wfluid.fields.ghosts import Ghosts
-from wfluid.fields.state import State
 from wfluid.fields.sums import InnerProduct
 from wfluid.kernels.adjoint import forces as forces_adjoint
 from wfluid.kernels.cell.layout import Layout
@@ -230,28 +229,28 @@ class Forcing:
         table = np.concatenate([numbers, *(row for row, _ in rows)])
         return ForcingRow(table, np.concatenate(boxes), prescribed)
 
-    def push(self, state: State, out: Vector) -> None:
-        """out = the state's velocity plus the impulses of forces, with ghosts: launches only."""
-        for f, to in zip((state.u, state.v), out, strict=True):
+    def push(self, velocity: Vector, rho: Vector, out: Vector) -> None:
+        """out = a velocity plus the impulses of forces, with ghosts; `rho` are densities: launches only."""
+        for f, to in zip(velocity, out, strict=True):
             algebra.copy.launch(self.layout, self.device, [f], [to])
         impulses = iter(self._impulses)
         for (_, fields), impulse in zip(self._fields, impulses, strict=False):
             for f, component in zip(fields, out, strict=True):
                 forces.push_field.launch(self.layout, self.device, [f, impulse], [component])
         for density, component, stride, impulse in self._buoyancy_terms(out):
-            inputs = [state.rho[density], impulse, stride]
+            inputs = [rho[density], impulse, stride]
             forces.lift.launch(self.layout, self.device, inputs, [component])
         for group in self._gaussian_forces:
             group.add(out)
         with together():
             for f, ghosts in zip(out, self._velocity_ghosts, strict=True):
                 ghosts.fill(f)
-        read = [state.rho[density] for _, density in self._buoyancies]
-        record(partial(self._push_back, state, out), [state.u, state.v, *read], out)
+        read = [rho[density] for _, density in self._buoyancies]
+        record(partial(self._push_back, velocity, rho, out), [*velocity, *read], out)
 
-    def _push_back(self, state: State, out: Vector) -> None:
-        """Add to the gradients of the state's velocity and densities; compute those of the impulses."""
-        out_bar, velocity = bars(out), (state.u, state.v)
+    def _push_back(self, velocity: Vector, rho: Vector, out: Vector) -> None:
+        """Add to the gradients of velocity and densities; compute those of the impulses."""
+        out_bar = bars(out)
         with together():
             for f, to in zip(out_bar, bars(velocity), strict=True):
                 algebra.add.launch(self.layout, self.device, [f], [to])
@@ -265,13 +264,13 @@ class Forcing:
         for _, fields in self._fields:
             self._inner.dot(gained_bar, fields, next(impulses_bar))
         for density, f_bar, stride, impulse in self._buoyancy_terms(gained_bar):
-            rho, rho_on_faces, face_bar = state.rho[density], self._rho_on_faces, self._face_bar
-            forces_adjoint.mean_with_before.launch(self.layout, self.device, [rho, stride], [rho_on_faces])
+            lifted, rho_on_faces, face_bar = rho[density], self._rho_on_faces, self._face_bar
+            forces_adjoint.mean_with_before.launch(self.layout, self.device, [lifted, stride], [rho_on_faces])
             self._inner.dot([f_bar], [rho_on_faces], next(impulses_bar))
             algebra.copy.launch(self.layout, self.device, [f_bar], [face_bar])
             self._velocity_ghosts[stride > 1].fill(face_bar)
             inputs = [face_bar, impulse, stride, self.layout.nx]
-            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [rho.grad])
+            forces_adjoint.lift_adjoint.launch(self.layout, self.device, inputs, [lifted.grad])
         for group in self._gaussian_forces:
             group.adjoint(gained_bar)
 

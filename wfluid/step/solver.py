@@ -23,7 +23,8 @@ from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
 from wfluid.solve.system import Residual
 from wfluid.step.forcing import Forcing
-from wfluid.step.step import Step
+from wfluid.step.inertial import InertialStep
+from wfluid.step.kinds import step_for
 
 REPLAYS_KEPT = 16
 """Number of captured steps that are kept; the one that was used least recently is dropped first."""
@@ -43,6 +44,9 @@ class SolveReport:
     """Sum of the largest divergences that growths prescribed [1/s]."""
     removed: float = 0.0
     """Mean of the prescribed divergence, subtracted everywhere: walls and seams let no volume out [1/s]."""
+    map_loss: float = 0.0
+    """An estimate of how far places of the map are off by the solves of the diffusion since the run began
+    [longer side]; 0 for steps outside a run."""
 
 
 class Solver:
@@ -60,7 +64,7 @@ class Solver:
         self.grid, self.fluid, self.device = grid, fluid, device
         self.compile_seconds = load_kernels(device)
         self.layout = Layout(grid.nx, grid.ny)
-        self._step = Step(grid, fluid, device)
+        self._step = step_for(grid, fluid, device)
         self._last_step, self._prescribed = (0.0, 0.0), 0.0
         self._written: WeakKeyDictionary[State, tuple[float, float]] = WeakKeyDictionary()
         self._stepping = threading.Lock()
@@ -69,6 +73,11 @@ class Solver:
         self._last_forcing: Forcing | None = None
         self._replays: dict[tuple, tuple[CapturedGraph, State, State, Forcing]] = {}
         self._pool = self._step.helpers()
+
+    @property
+    def transports_with_new_velocity(self) -> bool:
+        """Whether a step moves the picture along the velocity after it; else along the one before it."""
+        return self._step.transports_with_new_velocity
 
     def rest(self, points: np.ndarray | Sequence[tuple[float, float]] = ()) -> State:
         """A new state: fluid at rest, undistorted picture, initial densities.
@@ -170,10 +179,9 @@ class Solver:
 
     def report(self) -> SolveReport:
         """Measure the true residuals and the divergence of the last step."""
-        step = self._step
-        pressure, divergence = step.projection.measure()
+        pressure, diffusion, divergence = self._step.measure()
         removed = self._last_forcing.removed if self._last_forcing else 0.0
-        return SolveReport(pressure, step.diffusion.measure(), divergence, self._prescribed, removed)
+        return SolveReport(pressure, diffusion, divergence, self._prescribed, removed)
 
     def carry(self, state_in: State, state_out: State, dt: float) -> None:
         """Only carry the map along `state_in`'s velocity for dt, which may be negative.
@@ -199,8 +207,14 @@ class Solver:
         step = self._ready(state_in, 0.0, dt)
         step.project((state_in.u, state_in.v), (state_out.u, state_out.v))
 
-    def _ready(self, state: State, t: float, dt: float) -> Step:
-        """The step, set up so that a single stage can run."""
+    def _ready(self, state: State, t: float, dt: float) -> InertialStep:
+        """The step, set up so that a single stage can run.
+
+        Raises:
+            TypeError: the fluid creeps, so that its step has no such stages.
+        """
+        if not isinstance(self._step, InertialStep):
+            raise TypeError("a creeping fluid neither diffuses nor projects a velocity; give it inertia")
         self._step.plan(t, dt, self._prepare)
         if self.fluid.viscosity_moves:
             self._step.update_coefficients(state)

@@ -1,25 +1,9 @@
-"""One step of the fluid: forces, advection, diffusion, projection (Bonilla & Velho, section II).
-
-    v1 = v0 + dt f                           forces
-    v2(x) = v1(foot of x)                    advection
-    v3 - dt div (2 mu S) + dt alpha v3 = v2  diffusion and drag, implicit Euler, S the strain of v3
-    v4 = v3 - beta grad q,  div beta grad q = div v3 - s,  beta = 1 / (1 + dt alpha)  projection
-
-s is the divergence that growths prescribe; it is 0 without growths.
-
-The foot is traced through v0, which is free of divergence; the map is carried from the same foot. v1 has
-divergence and would compress the picture (Bridson, 2nd ed., section 3.1). With scheme "paper" v1 is traced,
-and map, densities and points then move with v4. The two differ by O(dt^2) a step.
-
-Advection followed by projection loses energy: it acts like a viscosity of about U^2 dt / 8 where streamlines
-are curved, U the largest speed (measured on Taylor-Green vortices with mu = 0: 0.121 to 0.125 of U^2 dt); a
-parallel shear flow loses none.
-"""
+"""The step of a fluid: what all kinds have in common. `inertial` and `creeping` find the velocity."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import warp as wp
 
@@ -32,14 +16,13 @@ from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.cell.program import ADJOINT
 from wfluid.kernels.cell.strips import alone
 from wfluid.model.fluid import Fluid
+from wfluid.solve.system import Residual
 from wfluid.step.advection import Advection
 from wfluid.step.coefficients import Coefficients
 from wfluid.step.densities import DensityTransport
-from wfluid.step.diffusion import CoupledDiffusion, SeparateDiffusion
 from wfluid.step.feet import Feet
 from wfluid.step.forcing import Forcing
-from wfluid.step.projection import Projection
-from wfluid.step.tape import attach_gradients, bars, record
+from wfluid.step.tape import attach_gradients, bars
 from wfluid.system.threads import ThreadTeam, free_cores, helpers
 
 STEP_THREADS = 2
@@ -55,19 +38,18 @@ COUPLED_WORK = 4
 """Cost of a step with coupled diffusion, relative to a step without."""
 
 
-class Step:
+class Step(ABC):
     """The stages of a step, with the arrays they work in. They only launch, so a graph can capture them.
 
     While a tape is recording, each stage puts its transpose on it (`tape`). The backward pass of a step may
     run later, after other steps: first `recompute` restores what the transposes read, then
     `tape.backward()` computes the gradients with respect to the state before the step, the forces and the
     viscosity, from those with respect to the state after it. A symmetric linear solver is its own
-    transpose, so no sweep or iterate of a solve is recorded. For conjugate gradients that holds up to their
-    tolerance: the fluid's own, or `jump_tolerance` where that is lower.
+    transpose, so no sweep or iterate of a solve is recorded.
     """
 
-    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, jump_tolerance: float = 1.0):
-        self.grid, self.fluid, self.device = grid, fluid, device
+    def __init__(self, grid: Grid, fluid: Fluid, device: wp.Device, fixed_tolerance: float):
+        self.grid, self.fluid, self.device, self.fixed_tolerance = grid, fluid, device, fixed_tolerance
         self.layout = Layout(grid.nx, grid.ny)
         walls = fluid.boundary
         self.velocity_ghosts = [
@@ -84,74 +66,68 @@ class Step:
         self.map_feet = Feet(grid, fluid, device, *ghosts) if self.paper else self.feet
         self.advection = Advection(grid, fluid, device, *ghosts)
         self.coefficients = None if fluid.separable else Coefficients(grid, fluid, device)
-        self.diffusion = (
-            CoupledDiffusion(fluid, self.coefficients, device, jump_tolerance)
-            if self.coefficients
-            else SeparateDiffusion(grid, fluid, device)
-        )
-        drag = self.coefficients if fluid.freeze else None
-        self.projection = Projection(grid, fluid, drag, device, self.velocity_ghosts, jump_tolerance)
         self.densities = [DensityTransport(density, grid, fluid, device) for density in fluid.densities]
         self.pushed = vector(self.layout, device, 2)
-        self._solves: tuple = ()
 
+    keeps_pressure: bool
+    """Whether a step reads the pressure of the one before."""
+    transports_with_new_velocity: bool
+    """Whether map, densities and points move along the velocity after the step; else the one before it."""
     pushed: Vector
     """The velocity after the forces of the last step that had any, with ghosts."""
 
+    @abstractmethod
     def advance(self, state_in: State, state_out: State, forcing: Forcing) -> None:
         """Write the state after the step to `state_out`: launches only; a tape that records takes them.
 
         The last record is the first to play: it sets gradients to 0 to which several stages add.
         """
-        if self.fluid.viscosity_moves:
-            self.update_coefficients(state_in)
-        before, after = (state_in.u, state_in.v), (state_out.u, state_out.v)
-        if not self.paper:
-            self.transport(state_in, state_out, before, forcing)
-        self.project(self.viscous(state_in, forcing), after, forcing)
-        if self.projection.accumulates_pressure:
-            self.projection.add_pressure(state_in.q, forcing, state_out.q)
-        if self.paper:
-            self.transport(state_in, state_out, after, forcing)
-        record(partial(self._clear_gradients, state_in), (), ())
 
-    def transport(self, state_in: State, state_out: State, velocity: Vector, forcing: Forcing) -> None:
-        """Move the state's points, densities and map along a velocity."""
-        points, out = (state_in.p_x, state_in.p_y), (state_out.p_x, state_out.p_y)
-        self.feet.carry_points(points, velocity, forcing, out)
-        foot = self.map_feet.trace(velocity, forcing)
-        self.carry_densities(state_in, foot, forcing, state_out)
-        self.carry_map(state_in, foot, state_out)
-
-    def viscous(self, state: State, forcing: Forcing) -> Vector:
-        """The velocity after forces, advection and diffusion, with ghosts.
-
-        The feet are those of `transport`, but with scheme "paper" those of the velocity after forces.
-        """
-        velocity = self.push(state, forcing)
-        if self.paper:
-            self.feet.trace(velocity, forcing)
-        velocity = self.advect(velocity, self.feet.foot)
-        if self.projection.accumulates_pressure:
-            velocity = self.projection.subtract_pressure(velocity, state.q, forcing)
-        return self.diffuse(velocity)
-
+    @abstractmethod
     def recompute(self, state_in: State, state_out: State, forcing: Forcing) -> None:
         """Compute again what the transposes of a step read besides the state before it: launches only.
 
-        Of the state after it the velocity is read, and that only with scheme "paper". Nothing is solved,
-        except for the gradient with respect to viscosity: it reads the diffused velocity.
+        Of the state after it the velocity is read, where that transports.
         """
-        if self.fluid.viscosity_moves:
-            self.update_coefficients(state_in)
-        transporting = state_out if self.paper else state_in
-        self.map_feet.trace((transporting.u, transporting.v), forcing)
-        if self._of_viscosity:
-            self.viscous(state_in, forcing)
-            return
-        velocity = self.push(state_in, forcing)
-        if self.paper:
-            self.feet.trace(velocity, forcing)
+
+    @abstractmethod
+    def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
+        """Set the step up for a length dt and an end at t. Returns the methods of its solves.
+
+        Calls `prepare`, which must launch `update_coefficients`, if the coefficients have changed.
+        """
+
+    @abstractmethod
+    def expect(self, times: Sequence[float], dt: float) -> tuple:
+        """Set up steps of dt that end at these times, in a viscosity that depends on time.
+
+        Returns the methods of their solves, which suit all of them. Before each step the caller must write
+        its viscosity to `coefficients.painted_mu` and call `update_coefficients`.
+        """
+
+    @abstractmethod
+    def update_coefficients(self, state: State | None = None) -> None:
+        """Update the coefficients on all grids, then the solvers: launches only.
+
+        With `state` the viscosity is first carried along with its map.
+        """
+
+    @abstractmethod
+    def pressure_part(self, dt: float, last_dt: float, divergence_prescribed: bool) -> float:
+        """The fraction of the last step's pressure that a step of dt subtracts before its diffusion."""
+
+    @abstractmethod
+    def take_fluid(self, fluid: Fluid) -> None:
+        """Replace the fluid by one that differs in the values of its viscosity only, not in its type."""
+
+    @abstractmethod
+    def measure(self) -> tuple[Residual, Residual, float]:
+        """Of the last step: the residuals of projection and diffusion, and the largest |div v - s| [1/s]."""
+
+    @property
+    @abstractmethod
+    def mu_bar(self) -> wp.array:
+        """The gradient with respect to the painted viscosity, at centres; every backward step adds to it."""
 
     def allow_gradients(self, of_viscosity: bool = False) -> None:
         """Allocate the arrays of the transposes, once, and load their kernels.
@@ -160,8 +136,6 @@ class Step:
         accurate as the solve of the diffusion. A viscosity that moves needs it in any case.
         """
         load_kernels(self.device, ADJOINT)
-        self._of_viscosity = of_viscosity or self.fluid.viscosity_moves
-        self.diffusion.allow_gradients(self._of_viscosity)
         if self.pushed[0].grad is not None:
             return  # captured graphs know the arrays by their addresses
         attach_gradients(self.pushed, self.layout, self.device)
@@ -170,7 +144,6 @@ class Step:
         self.feet.allow_gradients()
         self.map_feet.allow_gradients()
         self.advection.allow_gradients()
-        self.projection.allow_gradients()
         for density in self.densities:
             density.allow_gradients()
 
@@ -183,97 +156,13 @@ class Step:
             added.append(self.coefficients.levels[0].mu)
         alone(lambda: fill(0.0, *bars(added)))
 
-    @property
-    def mu_bar(self) -> wp.array:
-        """The gradient with respect to the painted viscosity, at centres; every backward step adds to it."""
-        if isinstance(self.diffusion, SeparateDiffusion):
-            return self.diffusion.mu_bar
-        return self.diffusion.coefficients.painted_mu.grad
-
-    def take_fluid(self, fluid: Fluid) -> None:
-        """Replace the fluid by one that differs in the values of its viscosity only, not in its type."""
-        if fluid.viscosity is self.fluid.viscosity:
-            return
-        self.fluid = self.diffusion.fluid = fluid
-        if self.coefficients:
-            self.coefficients.fluid = fluid
-            self.coefficients.invalidate()
-
-    def helpers(self, alone: bool = False) -> ThreadTeam | None:
-        """The threads that share the launches of a step with the calling one; None where that is no faster.
-
-        Smaller grids gain from it if the process is `alone`, that is, does no other work meanwhile.
-        """
-        work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.coefficients else 1)
-        least = SHARED_ALONE if alone else SHARED_CELLS
-        shared = not self.device.is_cuda and free_cores() >= STEP_THREADS and work >= least
-        return helpers(STEP_THREADS if shared else 1)
-
-    def plan(self, t: float, dt: float, prepare: Callable[[], None]) -> tuple:
-        """Set the step up for a length dt and an end at t. Returns the methods of its solves.
-
-        Calls `prepare`, which must launch `update_coefficients`, if the coefficients have changed.
-        """
-        densities = tuple(density.plan(dt) for density in self.densities)
-        coefficients = self.coefficients
-        if not coefficients:
-            return self.diffusion.plan(dt), self.projection.method, *densities
-        if coefficients.set_time(t, dt):
-            try:
-                self._solves = self.diffusion.plan(dt), self.projection.plan(dt)
-                if not self.fluid.viscosity_moves:
-                    prepare()
-            except BaseException:
-                coefficients.invalidate()  # half done
-                raise
-        return *self._solves, *densities
-
-    def pressure_part(self, dt: float, last_dt: float, divergence_prescribed: bool) -> float:
-        """The fraction of the last step's pressure that a step of dt subtracts before its diffusion.
-
-        It is 0 where viscosity changes or moves: that pressure belongs to the strain at the old places. It
-        is also 0 where the last step had `divergence_prescribed`, whose pressure acts in that step only, and
-        with scheme "paper", whose pressure starts anew in every step.
-        """
-        coefficients = self.coefficients
-        if not coefficients or coefficients.changes or self.fluid.viscosity_moves or self.paper:
-            return 0.0
-        if last_dt == 0 or divergence_prescribed:
-            return 0.0
-        return min(1.0, dt / last_dt)
-
-    def expect(self, times: Sequence[float], dt: float) -> tuple:
-        """Set up steps of dt that end at these times, in a viscosity that depends on time.
-
-        Returns the methods of their solves, which suit all of them. Before each step the caller must write
-        its viscosity to `coefficients.painted_mu` and call `update_coefficients`.
-        """
-        coupled = self._coupled()
-        coupled.coefficients.bound_over(times, dt)
-        return coupled.plan(dt), self.projection.plan(dt), *(d.plan(dt) for d in self.densities)
-
-    def update_coefficients(self, state: State | None = None) -> None:
-        """Update the coefficients on all grids, then the solvers: launches only.
-
-        With `state` the viscosity is first carried along with its map.
-        """
-        coupled = self._coupled()
-        if state:
-            coupled.coefficients.carry(state)
-        coupled.coefficients.coarsen()
-        coupled.update_coefficients()
-        if self.fluid.freeze:
-            self.projection.update_coefficients()
-
-    def _coupled(self) -> CoupledDiffusion:
-        """The diffusion of a fluid with coefficients.
-
-        Raises:
-            TypeError: one viscosity, and no drag, holds everywhere.
-        """
-        if not isinstance(self.diffusion, CoupledDiffusion):
-            raise TypeError("a fluid with one viscosity and no drag has no coefficients")
-        return self.diffusion
+    def transport(self, state_in: State, state_out: State, velocity: Vector, forcing: Forcing) -> None:
+        """Move the state's points, densities and map along a velocity."""
+        points, out = (state_in.p_x, state_in.p_y), (state_out.p_x, state_out.p_y)
+        self.feet.carry_points(points, velocity, forcing, out)
+        foot = self.map_feet.trace(velocity, forcing)
+        self.carry_densities(state_in, foot, forcing, state_out)
+        self.carry_map(state_in, foot, state_out)
 
     def trace(self, state: State, forcing: Forcing) -> Vector:
         """The feet (departure points) of all centres along the state's velocity [cells], with ghosts."""
@@ -290,21 +179,12 @@ class Step:
         for density, rho, sources, out in stages:
             density.advance(rho, foot, self.lookup_args, sources, out)
 
-    def push(self, state: State, forcing: Forcing) -> Vector:
-        """The velocity after forces, with ghosts: the state's own arrays if no force acts on it."""
-        if not forcing.adds_velocity:
-            return state.u, state.v
-        forcing.push(state, self.pushed)
-        return self.pushed
+    def helpers(self, alone: bool = False) -> ThreadTeam | None:
+        """The threads that share the launches of a step with the calling one; None where that is no faster.
 
-    def advect(self, velocity: Vector, foot: Vector) -> Vector:
-        """The velocity carried along the flow, with ghosts."""
-        return self.advection.carry_velocity(velocity, foot)
-
-    def diffuse(self, velocity: Vector) -> Vector:
-        """The velocity after viscosity and drag, with ghosts: the same arrays if there is neither."""
-        return self.diffusion.diffuse(velocity) if self.diffusion.method.iterations else velocity
-
-    def project(self, velocity: Vector, out: Vector, forcing: Forcing | None = None) -> None:
-        """out = the projected velocity, with ghosts; its divergence is what `forcing` prescribes, or 0."""
-        self.projection.project(velocity, out, forcing if forcing and forcing.prescribes_divergence else None)
+        Smaller grids gain from it if the process is `alone`, that is, does no other work meanwhile.
+        """
+        work = self.grid.nx * self.grid.ny * (COUPLED_WORK if self.coefficients else 1)
+        least = SHARED_ALONE if alone else SHARED_CELLS
+        shared = not self.device.is_cuda and free_cores() >= STEP_THREADS and work >= least
+        return helpers(STEP_THREADS if shared else 1)

@@ -58,3 +58,9 @@ class CoordinateMap:
             weights_x, weights_y = weights[..., 0].T * signs_x, weights[..., 1].T * signs_y
             found[:, component] += np.einsum("nj,nji,ni->n", weights_y, values, weights_x)
         return found
+
+    def slope_at(self, place: np.ndarray) -> np.ndarray:
+        """The Jacobian at a place, (2, 2), a row per component of the source; one-sided at edges."""
+        grid, step = self.grid, np.diag([self.grid.hx, self.grid.hy])
+        ahead, behind = (np.clip(place + by, 0.0, (grid.width, grid.height)) for by in (step, -step))
+        return ((self.source_at(ahead) - self.source_at(behind)) / np.diag(ahead - behind)[:, None]).T
