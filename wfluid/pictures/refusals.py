@@ -78,10 +78,13 @@ def check_jpeg2000(path: Path, memory: int) -> None:
     The size stands in the segment SIZ (ISO 15444-1, A.5.1), as the corners of the picture on a canvas.
 
     Raises:
-        PictureError: as `check_size` and `check_memory`.
+        PictureError: as `check_size` and `check_memory`; the file cannot be read.
     """
-    with path.open("rb") as file:
-        head = file.read(1 << 16)
+    try:
+        with path.open("rb") as file:
+            head = file.read(1 << 16)
+    except OSError as error:
+        raise PictureError(f"{path}: cannot be read ({error.strerror})") from None
     at = head.find(b"\xff\x4f\xff\x51")
     if at < 0 or not (at == 0 or head[4:8] == b"jP  ") or len(head) < at + 42:
         return
