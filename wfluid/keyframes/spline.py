@@ -20,17 +20,24 @@ from wfluid.animation.animation import Animation
 from wfluid.domain.envelopes import Constant
 from wfluid.domain.grid import Grid
 from wfluid.fields.state import State
+from wfluid.keyframes.arrival import FROZEN
 from wfluid.keyframes.keyframes import PointTarget
 from wfluid.keyframes.responses import Probe
 from wfluid.keyframes.search import SPLINE, Progress, SearchLog, Stopped
-from wfluid.keyframes.ways import plan_ways, radii_of, window_edges
+from wfluid.keyframes.ways import plan_ways, radii_of, spacings, window_edges
 from wfluid.model.force import Force, flatten
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 
-RADII = (0.12, 0.04, 0.012)
-"""Radii of the forces at every point [longer side]; the last is at most half the distance of two points."""
+WIDEST, NARROWEST = 0.12, 0.012
+"""Largest radius of a force, and the least of the narrowest one [longer side]."""
+
+OF_ROOM = 0.3
+"""Least radius of a force, as a fraction of the least distance of two ways, or of one to a frozen part."""
+
+ANOTHER = 1.3
+"""Least ratio of two radii at one point: nearer ones do nearly the same."""
 
 CELLS_A_RADIUS = 2.0
 """Cells in the least radius, on the animation's grid and on the coarse one."""
@@ -62,8 +69,7 @@ class Spline:
         self.ways = plan_ways(particles, (grid.width, grid.height), seed)
         radii = radii_of(self.ways)
         self._edges = window_edges(self.ways, radii, timeline)
-        least = max(CELLS_A_RADIUS / animation.cells, min(RADII[-1], *radii))
-        self.radii = (*(radius for radius in RADII[:-1] if radius > 1.5 * least), least)
+        self.radii = self._radii()
         self.given: tuple[Force, ...] = flatten(animation.forces)
         self.found = start
         self._points = np.array([particle.point for particle in particles])
@@ -73,6 +79,27 @@ class Spline:
     """The forces of the animation."""
     found: tuple[GaussianForce, ...]
     """The forces found so far."""
+
+    def _radii(self) -> tuple[float, ...]:
+        """The radii of the forces at every point, from the widest to the one that the least room needs."""
+        animation = self.animation
+        room = min(*spacings(self.ways), self._room_within_frozen())
+        least = max(OF_ROOM * room, NARROWEST, CELLS_A_RADIUS / animation.cells)
+        least = min(least, WIDEST)
+        found = [WIDEST, math.sqrt(WIDEST * least), least]
+        return tuple(r for n, r in enumerate(found) if n == 2 or r > ANOTHER * found[n + 1])
+
+    def _room_within_frozen(self) -> float:
+        """The least distance of a point, or of a destination, to a frozen part [longer side]."""
+        grid, freeze = self.animation.grid, self.animation.fluid.freeze
+        if freeze is None:
+            return math.inf
+        rows, columns = np.nonzero(freeze.paint.sample(grid) > FROZEN)
+        if not len(rows):
+            return math.inf
+        frozen = np.stack([(columns + 0.5) * grid.hx, (rows + 0.5) * grid.hy], axis=1)
+        places = [place for p in self.particles for place in (p.point, *p.destinations) if not p.pinned]
+        return min(float(np.linalg.norm(frozen - place, axis=1).min()) for place in places)
 
     def run(self) -> None:
         """Find the forces of all windows, and correct the destinations for the residual of the map.

@@ -122,13 +122,17 @@ def _moments(ways: Sequence[Way]) -> np.ndarray:
 
 def radii_of(ways: Sequence[Way], factor: float = 1.0) -> list[float]:
     """The radius of each way's forces [longer side], times a factor within the limits."""
+    return [min(WIDEST, max(NARROWEST, factor * OF_SPACING * spacing)) for spacing in spacings(ways)]
+
+
+def spacings(ways: Sequence[Way]) -> list[float]:
+    """The least distance of each way to another one at one time [longer side]."""
     times = _moments(ways)
     places = [way.at(times) for way in ways]
     found = []
     for n, own in enumerate(places):
         others = [np.linalg.norm(own - other, axis=1).min() for m, other in enumerate(places) if m != n]
-        spacing = min(others, default=math.inf)
-        found.append(float(min(WIDEST, max(NARROWEST, factor * OF_SPACING * spacing))))
+        found.append(float(min(others, default=math.inf)))
     return found
 
 
