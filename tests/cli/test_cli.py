@@ -110,7 +110,7 @@ def test_warmup_says_what_it_did():
         (("--push", "999,2:1,1"), "outside the picture"),
         (("--push", "1,2:1,1", "--viscosity", "-1"), "--viscosity -1.0: expected a number from 0 to 1000"),
         (("--push", "1,2:1,1", "--viscosity", "nan"), "--viscosity nan: expected"),
-        (("--push", "1,2:1,1", "--viscosity", "thick"), "invalid float value"),
+        (("--push", "1,2:1,1", "--viscosity", "thick"), "--viscosity 'thick': expected a number"),
         (("--push", "1,2:1,1", "--walls", "soft"), "expected free-slip"),
         (("--push", "1,2:1,1", "--scheme", "best"), "expected one of standard, paper"),
         (("--push", "1,2:1,1", "--solver", "lu"), "expected one of multigrid, jacobi"),

@@ -156,7 +156,7 @@ def test_what_was_done_to_the_pictures_is_said(folder):
         ({"morph": {"to": "other.png", "warp_curve": [[3, 0.5]]}}, "times within the morph"),
         (
             {"morph": {"to": "other.png", "warp_curve": [[1, 0.5], [1, 0.6]]}},
-            "morph: warp_curve: two keys have one time",
+            "morph.warp_curve: two keys have one time",
         ),
         ({"morph": {"to": "other.png", "waltz": 1}}, "morph.waltz: no such key"),
     ],

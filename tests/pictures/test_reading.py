@@ -188,3 +188,15 @@ def test_an_animated_png_is_known_by_its_chunk(tmp_path):
 def test_a_targa_that_says_it_has_alpha_is_believed(tmp_path):
     save(tmp_path / "a.tga", rgba((0, 0)), oiio__UnassociatedAlpha=1)
     assert read_picture(tmp_path / "a.tga").alpha == 3
+
+
+def test_values_that_are_not_finite_are_replaced_with_a_note(tmp_path):
+    values = np.full((4, 5, 3), 0.5, dtype=np.float32)
+    values[0, 0] = np.nan, np.inf, -np.inf
+    values[1, 1, 0] = 1e30
+    save(tmp_path / "a.exr", values, "float")
+    picture = read_picture(tmp_path / "a.exr")
+    assert list(picture.pixels[0, 0]) == [0, 65504, -65504] and picture.pixels[1, 1, 0] == np.float32(1e30)
+    assert picture.notes == ("3 values are not finite: NaN becomes 0, infinite ones 65504",)
+    with pytest.raises(PictureError, match=r"a.exr: 3 values are not finite"):
+        read_picture(tmp_path / "a.exr", exact=True)

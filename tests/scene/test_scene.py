@@ -72,7 +72,7 @@ HERE = "[[force]]  # here\n"
         ("cells = 16", "cells = 3  # here", "fluid.cells: 3: expected a whole number from 4 to 8192"),
         ("cells = 16", "cells = 16.5  # here", "fluid.cells: 16.5: expected a whole number from 4"),
         ('"ink"', '"ink"\ncolor = "red"  # here', "density.0.color: 'red': expected a colour such as"),
-        ("[fluid]", '[fluid]  # here\nwalls = "soft"', "fluid: walls 'soft': expected free-slip, no-slip"),
+        ("[fluid]", '[fluid]\nwalls = "soft"  # here', "fluid.walls: 'soft': expected free-slip, no-slip"),
         ("wfluid = 1", "wfluid = 1\neffect = 3  # here", "effect: expected a table, [effect]\n"),
         ("[fluid]", "[[fluid]]  # here", "fluid: expected a table, [fluid]\n"),
         ('[[group]]\nname = "nose"', '[group]  # here\nname = "nose"', "group: expected a list of tables, "),

@@ -11,6 +11,7 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
+from wfluid.domain.checks import check_whole
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import CELLS, CELLS_LIMIT, FPS, LEAST_CELLS, SIZE_LIMIT
 from wfluid.domain.timeline import Timeline
@@ -65,12 +66,10 @@ class Animation:
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
-            size = getattr(self, name)
-            if size is not None and not 1 <= size <= SIZE_LIMIT:
-                raise ValueError(f"{name} {size}: expected 1 … {SIZE_LIMIT} pixels")
+            if getattr(self, name) is not None:
+                check_whole(name, getattr(self, name), 1, SIZE_LIMIT, " pixels")
         check_look_up(self.filter, self.edge)
-        if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
-            raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
+        check_whole("cells", self.cells, LEAST_CELLS, CELLS_LIMIT)
         forces = flatten(self.forces)
         if self.loop is not None:
             check_loop(self.loop, forces)

@@ -12,7 +12,7 @@ from wfluid.domain.limits import KEYFRAME_VISCOSITY
 from wfluid.files.names import numbering
 from wfluid.files.points import read_points
 from wfluid.scene.format import SCENE, VERSION
-from wfluid.scene.scene import Scene
+from wfluid.scene.scene import COMMAND_LINE, Scene
 from wfluid.scene.schema import ArrayOf, Key, Table
 from wfluid.scene.short_forms import FORMS, as_pair, parse_density, parse_move, read_force
 
@@ -34,7 +34,7 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
         tables["viscosity"]["value"] = KEYFRAME_VISCOSITY
     if options.freeze is not None:
         tables["freeze"] = dict(zip(("mask", "strength"), _mask_and_number(options.freeze), strict=False))
-    flags: dict[tuple, str] = {}
+    flags: dict[tuple, str] = {("freeze",): "--freeze"}
     tables["force"], tables["density"] = [], []
     _add_drawn(options, tables, flags)
     if options.verb == "morph":
@@ -49,7 +49,7 @@ def scene_of_options(options: argparse.Namespace) -> Scene:
     tables["tracks"] = {"points": points} if points else {}
     tables["output"] = _outputs(options)
     given = {key: value for key, value in tables.items() if value}
-    return Scene(given, source="command line", flags={**dict(_flags(SCENE, given)), **flags})
+    return Scene(given, source=COMMAND_LINE, flags={**dict(_flags(SCENE, given)), **flags})
 
 
 def _flags(what: Any, value: Any, path: tuple = ()) -> Iterator[tuple[tuple, str]]:

@@ -58,7 +58,8 @@ class Parser(argparse.ArgumentParser):
             flag = word.partition("=")[0]
             if not flag.startswith("-"):
                 self.error(f"{word!r} is one argument too many")
-            self.error(f"there is no flag {flag}{_nearest(flag, list(self._option_string_actions))}")
+            known = list(self._option_string_actions)
+            self.error(f"there is no flag {flag}{_key_of(flag, known) or _nearest(flag, known)}")
         return options, unknown
 
     def error(self, message: str) -> NoReturn:
@@ -67,6 +68,10 @@ class Parser(argparse.ArgumentParser):
         if wrong:
             near = _nearest(wrong[1], list(HELP)) or f"; expected {wrong[2]}"
             message = f"there is no verb {wrong[1]!r}{near}"
+        if wrong := re.match(r"argument (\S+): invalid (int|float) value: (.*)", message):
+            message = f"{wrong[1]} {wrong[3]}: expected a {'whole ' if wrong[2] == 'int' else ''}number"
+        if wrong := re.match(r"argument (\S+): expected one argument", message):
+            message = f"{wrong[1]}: its value is missing"
         self.exit(Exit.INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
@@ -74,6 +79,21 @@ def _nearest(word: str, known: list[str]) -> str:
     from wfluid.scene.types import nearest
 
     return nearest(word, known)
+
+
+def _key_of(flag: str, known: list[str]) -> str:
+    """How --set, where it is known, gives the value of another command's flag; empty if it does not."""
+    if "--set" not in known:
+        return ""
+    from wfluid.scene.format import SCENE
+    from wfluid.scene.schema import Key, Table
+
+    for name, part in SCENE.keys.items():
+        keys = {f"{name}.{inner}": one for inner, one in part.keys.items()} if isinstance(part, Table) else {}
+        for path, key in (keys or {name: part}).items():
+            if isinstance(key, Key) and key.flag == flag:
+                return f"; give --set {path}=VALUE"
+    return ""
 
 
 class Version(argparse.Action):

@@ -55,13 +55,12 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     searched = staged if isinstance(staged, StagedKeyframes) and not without_run else None
     if options.save_scene and not searched:
         write_scene(options.save_scene, _with_sizes(scene, staged))
-    if options.dry_run:
-        _print_plan(scene, staged)
-        return Exit.DONE
     if options.preview:
         aims = staged.aims if isinstance(staged, StagedKeyframes) else None
         write_picture(options.preview, draw_controls(scene, staged.animation, aims))
-    if options.preview or not (scene.outputs or searched):
+    if options.dry_run:
+        _print_plan(scene, staged)
+    if without_run or not (scene.outputs or searched):
         return Exit.DONE
 
     compiling = _load_kernels(staged.animation, options.quiet)

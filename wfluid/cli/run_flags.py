@@ -12,7 +12,9 @@ def add_run(parser: argparse.ArgumentParser) -> None:
         "--preview", metavar="FILE", help="draw the controls on the picture, write it to FILE, and stop"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="print what would be computed and written, and stop"
+        "--dry-run",
+        action="store_true",
+        help="print what a run would compute and write, and stop; --preview and --save-scene still write",
     )
     parser.add_argument(
         "--report", metavar="FILE.json", help="write settings, times and quality measures as JSON"

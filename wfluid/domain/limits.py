@@ -122,6 +122,10 @@ TYPES = ("uint8", "uint16", "half", "float")
 QUALITY_LIMIT = 100
 """Best quality of a lossy format; 1 is the poorest."""
 
+SIDE_LIMIT, CHANNEL_LIMIT = 65_535, 1024
+"""Longest side of a picture that is read [px], limited by most formats and by 32-bit indices; and the largest
+number of channels."""
+
 SIZE_LIMIT = 32768
 """Longest side of a frame [px]."""
 

@@ -45,9 +45,12 @@ class Walls:
 
         Raises:
             ValueError: an unknown condition, or more than two.
+            TypeError: neither walls nor a text.
         """
         if isinstance(text, Walls):
             return text
+        if not isinstance(text, str):
+            raise TypeError(f"walls {text!r}: expected Walls, or a text such as {WALLS[0]!r}")
         words = [word.strip() for word in text.split(",")]
         names = [wall.value for wall in Wall]
         if len(words) > 2 or any(word not in names for word in words):

@@ -10,7 +10,7 @@ import warp as wp
 from wfluid.fields.kernel_cache import load_intact
 from wfluid.kernels.cell.lock import exclusive
 from wfluid.kernels.cell.program import FORWARD, module_of
-from wfluid.system.stderr import quiet_stderr
+from wfluid.system.quiet import quiet_libraries
 
 
 class DeviceError(ValueError):
@@ -26,7 +26,7 @@ def open_device(name: str | None = None) -> wp.Device:
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)
     try:
-        with quiet_stderr():
+        with quiet_libraries():
             wp.init()
     except OSError as error:
         raise DeviceError(
@@ -34,7 +34,7 @@ def open_device(name: str | None = None) -> wp.Device:
             "name another one in WARP_CACHE_PATH"
         ) from error
     try:
-        with quiet_stderr():  # the driver's complaints, where there is none
+        with quiet_libraries():  # the driver's complaints, where there is none
             return wp.get_device(name or "cpu")
     except (ValueError, RuntimeError) as error:
         aliases = ", ".join(device.alias for device in wp.get_devices())

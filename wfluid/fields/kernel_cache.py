@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from wfluid.system.atomic import atomic_write_text
-from wfluid.system.stderr import quiet_stderr
+from wfluid.system.quiet import quiet_libraries
 
 _SUMS = "wfluid.sha256"
 _SOURCES = (".cpp", ".cu")
@@ -38,7 +38,7 @@ def load_intact(folder: Path, load: Callable[[], Loaded]) -> Loaded:
         loaded = load()
     else:
         try:
-            with quiet_stderr():
+            with quiet_libraries():
                 loaded = load()
         except Exception:
             _remove(folder)

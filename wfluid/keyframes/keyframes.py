@@ -60,6 +60,16 @@ class PointTarget:
     """Whether it should stay in its place all the time."""
 
 
+def check_time(time: float, end: float) -> None:
+    """Check that a keyframe is not after the end [s].
+
+    Raises:
+        ValueError: it is.
+    """
+    if time > end * (1 + 1e-9):
+        raise ValueError(f"a keyframe at {time:g} s: expected at most the duration, {end:g} s")
+
+
 def targets_of(
     keyframes: Sequence[ParticleKeyframe],
     pins: Sequence[Place],
@@ -83,8 +93,7 @@ def targets_of(
     for keyframe in keyframes:
         for what, place in (("point", keyframe.point), ("destination", keyframe.destination)):
             _check_inside(f"the {what}", place, extent, side)
-        if keyframe.time > end * (1 + 1e-9):
-            raise ValueError(f"a keyframe at {keyframe.time:g} s: expected at most the duration, {end:g} s")
+        check_time(keyframe.time, end)
         moved.setdefault(_known(keyframe.point, moved), []).append(keyframe)
     for pin in pins:
         _check_inside("the pin", pin, extent, side)

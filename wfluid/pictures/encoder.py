@@ -10,7 +10,7 @@ import numpy as np
 from wfluid.pictures.formats import PictureError, first_line
 from wfluid.system.encoded import encoded
 from wfluid.system.errors import WriteError
-from wfluid.system.stderr import quiet_stderr
+from wfluid.system.quiet import quiet_libraries
 
 _IN_ORDER = (".png", ".jpg", ".jpeg", ".webp")
 """Formats that are written from beginning to end. On a failing disk, libjpeg ends the process, and libwebp
@@ -35,7 +35,7 @@ def file_bytes(path: Path, specs: Sequence, images: Sequence[np.ndarray]) -> byt
     if size > (longest := _SIDES.get(ending, size)):
         raise PictureError(f"{path}: a side of {size} pixels; {ending} has at most {longest}")
     try:
-        with quiet_stderr():
+        with quiet_libraries():
             data = encoded(lambda name: _write(path, name, specs, images), in_order=ending in _IN_ORDER)
     except WriteError as error:
         raise WriteError(f"{path}: cannot be written ({error})") from None

@@ -15,11 +15,16 @@ import numpy as np
 from wfluid.domain.limits import TYPES
 from wfluid.pictures.formats import LINEAR, PictureError, first_line
 from wfluid.pictures.profiles import Profile, read_profile
-from wfluid.system.memory import free_memory, readable_size
-from wfluid.system.stderr import quiet_stderr
-
-SIDE_LIMIT = 65_535
-"""Longest side of a picture [px], limited by most formats and by 32-bit indices."""
+from wfluid.pictures.refusals import (
+    check_jpeg2000,
+    check_memory,
+    check_size,
+    message_of,
+    own_limits,
+    refusal,
+)
+from wfluid.system.memory import free_memory
+from wfluid.system.quiet import quiet_libraries
 
 STRAIGHT = ("jpeg2000", "jpegxl", "bmp", "gif", "dds", "dpx")
 """Formats of straight alpha, whose readers in OpenImageIO leave it to be taken for premultiplied."""
@@ -77,25 +82,27 @@ def read_stored(path: Path, colorspace: str) -> Stored:
         raise PictureError(f"{path}: {why}")
     if path.stat().st_size == 0:
         raise PictureError(f"{path}: the file is empty")
+    memory = free_memory()
+    check_jpeg2000(path, memory)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)
     notes: list[str] = []
-    with quiet_stderr():
+    with quiet_libraries(), own_limits(oiio, memory):
         source = oiio.ImageInput.open(str(path), hints)
         if source is None:
-            raise PictureError(f"{path}: not a picture that can be read ({first_line(_message(oiio))})")
+            raise refusal(path, message_of(oiio), memory)
         try:
             page = _page(source.format_name(), oiio.ImageInput.open(str(path)), notes)
             source.seek_subimage(page, 0)
             if source.format_name() == "png" and _is_animated(path):
                 notes.append(_FIRST)
             spec = source.spec()
-            _check(path, spec)
+            _check(path, source.format_name(), spec, memory)
             dtype = _type_of(str(spec.format))
             raw = _raw_channels(source.format_name(), spec) if colorspace in ("auto", "data") else []
             stored = source.read_image(page, 0, 0, spec.nchannels, dtype)
             counts = {n: source.read_image(page, 0, n, n + 1, kind) for n, kind in raw}
-            message = _message(source)
+            message = message_of(source)
             kind = source.format_name()
         finally:
             source.close()
@@ -153,23 +160,18 @@ def _is_animated(png: Path) -> bool:
         return b"acTL" in file.read(1 << 16).partition(b"IDAT")[0]
 
 
-def _check(path: Path, spec: Any) -> None:
+def _check(path: Path, kind: str, spec: Any, memory: int) -> None:
     """Check kind and size of a picture before memory is allocated.
 
     Raises:
-        PictureError: samples in depth, a size out of range, or one that exceeds the free memory.
+        PictureError: no picture, samples in depth, a size out of range, or one that exceeds the free memory.
     """
+    if kind == "null":  # OpenImageIO's black picture for every file of this name
+        raise PictureError(f"{path}: not a picture; files of this name hold nothing")
     if spec.deep:
         raise PictureError(f"{path}: a deep picture, with samples in depth; flatten it first")
-    if not (1 <= spec.width <= SIDE_LIMIT and 1 <= spec.height <= SIDE_LIMIT and spec.depth == 1):
-        size = f"{spec.width} x {spec.height} x {spec.depth}"
-        raise PictureError(f"{path}: {size} pixels; sides of 1 … {SIDE_LIMIT} can be read")
-    need, there = 12 * spec.width * spec.height * max(spec.nchannels, 1), free_memory()
-    if need > there:
-        raise PictureError(
-            f"{path}: {spec.width} x {spec.height} pixels need about {readable_size(need)} of memory, "
-            f"{readable_size(there)} are free; make the picture smaller first"
-        )
+    check_size(path, (spec.width, spec.height, spec.depth), spec.nchannels)
+    check_memory(path, (spec.width, spec.height), spec.nchannels, memory)
 
 
 def _type_of(format_name: str) -> str:
@@ -226,11 +228,3 @@ def _forget(spec: Any, kind: str, alpha: int | None) -> None:
     if kind != "openexr":  # elsewhere an offset is a place on paper
         spec.x = spec.y = spec.full_x = spec.full_y = 0
         spec.full_width, spec.full_height = spec.width, spec.height
-
-
-def _message(library: Any) -> str:
-    """OpenImageIO's message, which cannot be decoded if it quotes bytes of a damaged file."""
-    try:
-        return library.geterror()
-    except UnicodeDecodeError:
-        return "invalid file structure"

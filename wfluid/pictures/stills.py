@@ -53,7 +53,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     are read). Alpha is linear in all files. Straight colours are linearised and then multiplied by alpha.
     32-bit integers in OpenEXR, and one or two channels of them in other formats, are data, read as they are;
     alpha without colours is data too. The EXIF orientation is applied. NaN becomes 0, infinite values the
-    largest half.
+    largest half, with a note.
 
     Raises:
         PictureError: a file that is missing, unreadable, damaged, deep or too large for the memory; with
@@ -64,10 +64,12 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
     read = read_stored(path, colorspace)
     data = read.data or colorspace == "data"
     srgb = colorspace == "srgb" or (colorspace == "auto" and read.integers and not data)
-    pixels = _linear(read, srgb)
-    if exact and not np.isfinite(pixels).all():
-        raise PictureError(f"{path}: {np.count_nonzero(~np.isfinite(pixels))} values are not finite")
-    pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
+    pixels, notes = _linear(read, srgb), read.notes
+    if wrong := pixels.size - np.count_nonzero(np.isfinite(pixels)):
+        if exact:
+            raise PictureError(f"{path}: {wrong} values are not finite")
+        notes += (f"{wrong} values are not finite: NaN becomes 0, infinite ones {LARGEST:g}",)
+        pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
     upright = _UPRIGHT.get(read.spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
     return Picture(
         np.ascontiguousarray(upright(pixels)),
@@ -77,7 +79,7 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
         srgb,
         data=data,
         profile=read.profile,
-        notes=read.notes,
+        notes=notes,
     )
 
 

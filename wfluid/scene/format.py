@@ -60,7 +60,7 @@ from wfluid.scene.forces import (
 )
 from wfluid.scene.keyframes import KeyframesTable, MorphTable
 from wfluid.scene.schema import SceneTable, array, file_key, key, mapping, optional, table, table_of
-from wfluid.scene.types import color, flag, names, number, text, version, whole, word
+from wfluid.scene.types import color, flag, names, number, text, version, whole, word, word_by_axis
 
 if TYPE_CHECKING:
     from wfluid.pictures.formats import Encoding
@@ -102,7 +102,7 @@ class FluidTable(SceneTable):
     )
     walls: str = key(
         f"boundary condition: {', '.join(WALLS)}, or two of them as x,y",
-        text(),
+        word_by_axis(*WALLS),
         default=WALLS[0],
         flag="--walls",
     )
@@ -233,7 +233,9 @@ class FramesTable(SceneTable):
         "width of the frames", whole(1, SIZE_LIMIT), unit="px", otherwise="the picture's", flag="--width"
     )
     scale: float | None = key(
-        "factor on the size of the picture, instead of width", number(above=0), flag="--scale"
+        "factor on the size of the picture, instead of width",
+        number(above=0, most=SIZE_LIMIT),
+        flag="--scale",
     )
     filter: str = key("interpolation between pixels", word(*FILTERS), default=FILTER, flag="--filter")
     edge: str = key("values beyond the edges of the picture", word(*EDGES), default=EDGE, flag="--edge")

@@ -28,13 +28,13 @@ def parse_value(text: str) -> Any:
         return text
 
 
-def set_value(tables: Any, path: list[str], value: Any, setting: str) -> None:
-    """Set the value at a path of keys, names and numbers, in place.
+def set_value(tables: Any, path: list[str], value: Any, setting: str) -> tuple[str | int, ...]:
+    """Set the value at a path of keys, names and numbers, in place; returns the path with numbers for names.
 
     Raises:
         SceneError: an item of a list that does not exist; the message quotes `setting`.
     """
-    at = tables
+    at, found = tables, []
     step: str | int
     for n, step in enumerate(path):
         last = n == len(path) - 1
@@ -45,10 +45,12 @@ def set_value(tables: Any, path: list[str], value: Any, setting: str) -> None:
                 at[step] = {}
         else:
             raise SceneError(f"--set {setting!r}: {'.'.join(path[:n])} is a value: expected a table")
+        found.append(step)
         if last:
             at[step] = value
         else:
             at = at[step]
+    return tuple(found)
 
 
 def _item(items: list, step: str, setting: str) -> int:

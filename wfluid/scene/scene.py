@@ -19,6 +19,9 @@ from wfluid.scene.names import check_morph, check_names
 from wfluid.scene.overrides import copied, parse_value, set_value
 from wfluid.scene.schema import Key, SceneError, SchemaError, blame, dotted
 
+COMMAND_LINE = "command line"
+"""Source of a scene that no file holds."""
+
 
 class Scene(SceneTables):
     """A shot: its tables as attributes, such as `scene.fluid.cells`, and its origin.
@@ -47,7 +50,7 @@ class Scene(SceneTables):
         flags: Mapping[tuple, str] | None = None,
     ):
         """Check the tables, nested dictionaries and lists as TOML has them."""
-        vars(self).update(folder=folder, source=source, lines=lines or {}, flags=flags or {})
+        vars(self).update(folder=folder, source=source, lines=lines or {}, flags=flags or {}, tables=tables)
         try:
             vars(self)["tables"] = checked(SCENE, tables)
             super().__init__(**attributes_of(SCENE, self.tables))
@@ -58,17 +61,36 @@ class Scene(SceneTables):
             raise self.error(error) from None
 
     def error(self, error: SchemaError) -> SceneError:
-        """The error of a key with the name and line of the scene, or with the flag that set the key."""
+        """The error of a key with the flag that set it, or with the name and line of the scene.
+
+        The error of a table names the flags that set its keys.
+        """
         path = error.path
+        if path not in self.flags and (below := self._flags_below(path)):
+            if self.source == COMMAND_LINE:
+                return SceneError(f"{below}: {error.reason}")
+            line = f"{self.source}:{self.lines[path]} with " if path in self.lines else ""
+            return SceneError(f"{line}{below}: {error}")
         for end in range(len(path), 0, -1):
             if path[:end] in self.flags:
                 flag, inner = self.flags[path[:end]], path[end:]
+                if flag.startswith("--set "):
+                    return SceneError(f"{flag}: {error}")
                 if inner or " " in flag or not error.about_value:
                     flag = f"{flag}: {dotted(inner)}:" if inner else f"{flag}:"
                 return SceneError(f"{flag} {error.reason}")
             if path[:end] in self.lines:
                 return SceneError(f"{self.source}:{self.lines[path[:end]]}: {error}")
         return SceneError(f"{self.source}: {error}")
+
+    def _flags_below(self, path: tuple) -> str:
+        """The flags that set keys of the table at a path, without their values; --set with its value."""
+        found = [
+            flag if flag.startswith("--set ") else flag.partition(" ")[0]
+            for key, flag in self.flags.items()
+            if path and key[: len(path)] == path and len(key) > len(path) and _has(self.tables, key)
+        ]
+        return " and ".join(dict.fromkeys(found))
 
     def with_tables(self, tables: Mapping[str, Any]) -> Scene:
         """A scene with other tables and the same origin.
@@ -88,13 +110,14 @@ class Scene(SceneTables):
         """
         if not settings:
             return self
-        tables = copied(self.tables)
+        tables, flags = copied(self.tables), dict(self.flags)
         for setting in settings:
             path, equals, value = setting.partition("=")
             if not equals or not path.strip():
                 raise SceneError(f"--set {setting!r}: expected key=value, such as time.duration=3")
-            set_value(tables, path.strip().split("."), parse_value(value), setting)
-        return self.with_tables(tables)
+            key = set_value(tables, path.strip().split("."), parse_value(value), setting)
+            flags[key] = f"--set {setting}"
+        return Scene(tables, self.folder, self.source, self.lines, flags)
 
     def writing(self, pictures: Sequence[str], report: str | None) -> Scene:
         """The scene with `pictures` in place of its outputs of the picture, and with a report.
@@ -165,6 +188,18 @@ class Scene(SceneTables):
                 yield
         except SchemaError as error:
             raise self.error(error) from error
+
+
+def _has(tables: Any, path: tuple) -> bool:
+    """Whether nested tables and lists have a key."""
+    for step in path:
+        if isinstance(tables, list) and isinstance(step, int) and step < len(tables):
+            tables = tables[step]
+        elif isinstance(tables, Mapping) and step in tables:
+            tables = tables[step]
+        else:
+            return False
+    return True
 
 
 def _names_file(what: Any, value: Any) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 from wfluid.scene.checking import checked
 from wfluid.scene.forces import FORCES
 from wfluid.scene.schema import SchemaError
-from wfluid.scene.types import as_number
+from wfluid.scene.types import as_number, nearest
 
 FORMS = {
     "push": ("X,Y:DX,DY", "center", "by"),
@@ -33,8 +33,11 @@ def parse_force(kind: str, text: str) -> dict[str, Any]:
     """The table of a force from its short form, such as push "X,Y:DX,DY:key=value,…".
 
     Raises:
-        ValueError: a wrong part; the message names it.
+        ValueError: an unknown kind, or a wrong part; the message names it.
     """
+    kinds = [known for known in FORMS if known in FORCES.tables]
+    if kind not in kinds:
+        raise ValueError(f"kind {kind!r}: expected one of {', '.join(kinds)}{nearest(kind, kinds)}")
     try:
         return checked(FORCES, read_force(kind, text))
     except SchemaError as error:
@@ -106,7 +109,8 @@ def _options(what: str, text: str, keys: list[str]) -> dict[str, Any]:
     for item in text.split(","):
         key, equals, value = (part.strip() for part in item.partition("="))
         if not equals or key not in keys:
-            raise ValueError(f"{what}: {item!r} is not key=value with a key of {', '.join(keys)}")
+            near = nearest(key, keys) if equals else ""
+            raise ValueError(f"{what}: {item!r} is not key=value with a key of {', '.join(keys)}{near}")
         if key in options:
             raise ValueError(f"{what}: {key} is given twice")
         options[key] = _option(what, key, value)

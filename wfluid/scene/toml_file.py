@@ -34,7 +34,8 @@ def read_scene(path: str | os.PathLike) -> Scene:
         tables = tomlkit.parse(text).unwrap()
     except ParseError as error:
         reason = re.sub(r" at line \d+ col \d+$", "", str(error))
-        raise SceneError(f"{path}:{error.line}:{error.col}: no TOML: {reason}") from None
+        place = f"{error.line}:{error.col}" if error.col else _line_and_column(text)
+        raise SceneError(f"{path}:{place}: no TOML: {reason}") from None
     except TOMLKitError as error:
         raise SceneError(f"{path}:{_line_and_column(text)}: no TOML: {error}") from None
     return Scene(tables, path.parent, str(path), _lines_of(text))
@@ -55,7 +56,7 @@ def write_scene(path: str | os.PathLike, scene: Scene) -> None:
 
 
 def _line_and_column(text: str) -> str:
-    """Line and column of an error that tomlkit reports without a place, such as a key given twice."""
+    """Line and column of an error that tomlkit reports without its place, such as a key given twice."""
     try:
         tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -85,6 +85,20 @@ def word(*words: str) -> Type:
     return Type(check, " or ".join(words), words=words)
 
 
+def word_by_axis(*words: str) -> Type:
+    """One of some words for both axes, or one for each, such as "periodic,no-slip"."""
+
+    def check(value: Any) -> str:
+        parts = value.split(",") if isinstance(value, str) else [value]
+        wrong = [part for part in parts if not isinstance(part, str) or part.strip() not in words]
+        if wrong or len(parts) > 2:
+            near = nearest(wrong[0], words) if wrong else ""
+            raise ValueError(f"expected {', '.join(words)}, or two of them as x,y{near}")
+        return value
+
+    return Type(check, " or ".join(words))
+
+
 def numbers(count: int, what: str) -> Type:
     """A list of `count` finite numbers; `what` describes it in messages."""
     one = number().check

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ from wfluid.domain.limits import MORPH_TOLERANCE, TOLERANCE
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
 from wfluid.files.points import read_points
-from wfluid.keyframes.keyframes import ParticleKeyframe, targets_of
+from wfluid.keyframes.keyframes import ParticleKeyframe, check_time, targets_of
 from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.scene.keyframes import FoundTable, KeyframesTable
 from wfluid.scene.scene import Scene
@@ -94,6 +95,7 @@ def aims_of(
         with blame(*move.key):
             to, start = destination(move.to), drawing.place("from", move.start)
             time = _on_step(timeline, move.time, note)
+            check_time(time, timeline.end)
             particles.append(ParticleKeyframe(start, to, time, move.weight))
     side, tolerance = drawing.side, MORPH_TOLERANCE if scene.morph else TOLERANCE
     aims = Aims(
@@ -104,19 +106,26 @@ def aims_of(
         scene.seed,
         side,
     )
-    targets_of(aims.keyframes, aims.pins, drawing.extent, timeline.end, side)
+    with blame("keyframes", "move"):
+        targets_of(aims.keyframes, aims.pins, drawing.extent, timeline.end, side)
     if scene.time.loop:
-        raise ValueError(
-            f"a loop ({scene.time.loop}) ends as it begins, so no keyframe is reached: leave out loop"
+        raise SchemaError(
+            ("time", "loop"),
+            f"a loop ({scene.time.loop}) ends as it begins, so no keyframe is reached: leave out loop",
         )
     return aims
 
 
 def _on_step(timeline: Timeline, time: float, note: Callable[[str], None]) -> float:
-    """The end of the step nearest to a time [s]; notes a change."""
+    """The end of the step nearest to a time [s], notes a change; within the duration, at most the last frame.
+
+    A time after the duration is returned as it is.
+    """
     near = timeline.time_of(max(1, round(time / timeline.dt)))
     if time > timeline.end:
-        return time
+        if time > timeline.duration or math.isclose(time, timeline.end, rel_tol=1e-9):
+            return time
+        near = timeline.end
     if abs(near - time) > 1e-6 * timeline.dt:
         note(f"a keyframe at {time:g} s is moved to {near:.6g} s, the end of a step")
     return near

@@ -7,6 +7,7 @@ from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.pairing import PicturePair, paired
 from wfluid.scene.keyframes import Curve, MorphTable
 from wfluid.scene.scene import Scene
+from wfluid.scene.schema import blame
 from wfluid.staging.drawing import Drawing
 from wfluid.staging.images import SceneImages, frame_size, read_noted
 
@@ -30,29 +31,36 @@ def settings_of(scene: Scene, morph: MorphTable, images: SceneImages) -> MorphSe
     """Timing, curves and blending of a morph.
 
     Raises:
-        ValueError: keys of a curve at one time, a delay without a mask.
+        SchemaError: keys of a curve at one time, a mask that cannot be used.
+        ValueError: a delay without a mask.
     """
     if morph.timing is None and morph.gives("delay"):
         raise ValueError("delay needs a timing mask: give timing, or leave delay out")
+    with blame("morph", "warp_curve"):
+        warp_curve = _curve(morph.warp_curve)
+    with blame("morph", "blend_curve"):
+        blend_curve = _curve(morph.blend_curve)
+    with blame("morph", "timing"):
+        mask = None if morph.timing is None else images.painted(morph.timing)
     return MorphSettings(
         scene.timeline,
-        warp_curve=_curve("warp_curve", morph.warp_curve),
-        blend_curve=_curve("blend_curve", morph.blend_curve),
+        warp_curve=warp_curve,
+        blend_curve=blend_curve,
         blend=morph.blend,
-        mask=None if morph.timing is None else images.painted(morph.timing),
+        mask=mask,
         delay=morph.delay,
         reverse=morph.reverse,
         pingpong=morph.pingpong,
     )
 
 
-def _curve(name: str, curve: Curve) -> str | dict[float, float]:
+def _curve(curve: Curve) -> str | dict[float, float]:
     """A curve's name, or its values by time."""
     if isinstance(curve, str):
         return curve
     keys = dict(curve)
     if len(keys) < len(curve):
-        raise ValueError(f"{name}: two keys have one time")
+        raise ValueError("two keys have one time")
     return keys
 
 
