@@ -107,16 +107,20 @@ class Spline:
         Raises:
             Stopped: the caller's `progress` stopped the search.
         """
+        best: tuple[float, tuple[GaussianForce, ...]] = (math.inf, ())
         for _ in range(1 + AIMED):
-            maps = self._steer()
-            if self._aim(maps) <= self.tolerance:
-                return
+            missed, longest = self._aim(*self._steer())
+            if missed < best[0]:
+                best = missed, self.found
+            if longest <= self.tolerance:
+                break
+        self.found = best[1] or self.found
 
-    def _steer(self) -> Mapping[int, CoordinateMap]:
-        """Find the forces of all windows; returns the maps at keyframes, by step."""
+    def _steer(self) -> tuple[Mapping[int, CoordinateMap], Mapping[int, np.ndarray]]:
+        """Find the forces of all windows; returns the maps and the points at keyframes, by step."""
         solver = self.animation.solver
         states = [solver.rest(self._points) for _ in range(3)]
-        probe, keyed, maps = self._probe(), set(self._keyed_steps()), {}
+        probe, keyed, maps, places = self._probe(), set(self._keyed_steps()), {}, {}
         self.found = ()
         for first, last in pairwise(self._edges):
             forces, states = self._window(probe, states, first, last)
@@ -124,7 +128,8 @@ class Spline:
             probe.advance((*self.given, *forces), range(first, last))
             if last in keyed:
                 maps[last] = CoordinateMap.of_state(states[0], self.animation.fluid.boundary)
-        return maps
+                places[last] = states[0].points
+        return maps, places
 
     def _probe(self) -> Probe:
         """The coarse grid's solver, or the animation's where that is as coarse."""
@@ -158,8 +163,9 @@ class Spline:
             misfit = self._taken(now, spare, forces, first, last).points - aims
             movable = np.where(responses.movable.reshape(-1, 2), misfit, 0.0)
             worst = float(np.linalg.norm(movable, axis=1).max())
-            if worst < best[0]:
-                best = worst, vectors
+            missed = float(np.sum(weights * movable.ravel() ** 2))
+            if missed < best[0]:
+                best = missed, vectors
             self._report(responses.cost, vectors, worst)
             if worst <= NEAR * self.tolerance or n == CORRECTIONS:
                 break
@@ -224,13 +230,18 @@ class Spline:
         dt = self.animation.timeline.dt
         return sorted({round(t / dt) for particle in self.particles for t in particle.times})
 
-    def _aim(self, maps: Mapping[int, CoordinateMap]) -> float:
-        """Correct destinations by the residual of the maps; returns the longest residual [longer side].
+    def _aim(
+        self, maps: Mapping[int, CoordinateMap], places: Mapping[int, np.ndarray]
+    ) -> tuple[float, float]:
+        """Correct destinations by the residual of the maps.
+
+        Returns the weighted sum of squared residuals, and the longest one [longer side]: of each keyframe the
+        larger of the map's and the particle's.
 
         Particles and map follow the same flow with different interpolations. A target in the middle leaves
         half of their difference to each.
         """
-        dt, longest = self.animation.timeline.dt, 0.0
+        dt, missed, longest = self.animation.timeline.dt, 0.0, 0.0
         for step, warp in maps.items():
             by = self._corrections.setdefault(step, np.zeros((len(self.particles), 2)))
             for n, particle in enumerate(self.particles):
@@ -238,6 +249,9 @@ class Spline:
                 if step in steps:
                     place = particle.destinations[steps.index(step)]
                     residual = warp.source_at(place[None])[0] - particle.point
-                    longest = max(longest, float(np.linalg.norm(residual)))
+                    off = float(np.linalg.norm(places[step][n] - place))
+                    worst = max(off, float(np.linalg.norm(residual)))
+                    missed += particle.weights[steps.index(step)] * worst**2
+                    longest = max(longest, worst)
                     by[n] += 0.5 * np.linalg.solve(warp.slope_at(place), residual)
-        return longest
+        return missed, longest
