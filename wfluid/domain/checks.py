@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from numbers import Real
+from typing import Any
 
 
 def check_word(name: str, value: object, known: Sequence[str], error: type[ValueError] = ValueError) -> None:
@@ -13,3 +15,29 @@ def check_word(name: str, value: object, known: Sequence[str], error: type[Value
     """
     if value not in known:
         raise error(f"{name} {value!r}: expected one of {', '.join(known)}")
+
+
+def check_number(name: str, value: object) -> None:
+    """Check that a value is a number; `name` is what the message calls it.
+
+    Raises:
+        TypeError: it is something else.
+    """
+    if not isinstance(value, Real):
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+
+
+def listed(name: str, given: Any, kinds: type | tuple[type, ...], what: str) -> tuple:
+    """Objects of some kinds as a tuple; one alone needs no list.
+
+    Raises:
+        TypeError: something else; the message has `name` and `what` was expected.
+    """
+    if isinstance(given, kinds):
+        return (given,)
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
+    for one in found:
+        if not isinstance(one, kinds):
+            got = f"the class {one.__name__}" if isinstance(one, type) else type(one).__name__
+            raise TypeError(f"{name}: expected {what}, got {got}")
+    return found

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from wfluid.domain.paths import Place
+from wfluid.domain.showing import short_repr
 
 
 class Objective:
@@ -112,6 +113,8 @@ class ParticleMisfit(ParticleObjective):
     weights: np.ndarray | float = 1.0
     """Weight of each particle, (n,)."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         for name in ("points", "destinations"):
             object.__setattr__(self, name, places_of(name, getattr(self, name)))
@@ -152,6 +155,8 @@ class ParticleFunction(ParticleObjective):
     The objective is the sum over all times."""
     times: Sequence[float]
     """Times at which it is evaluated [s]."""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))

@@ -1,13 +1,13 @@
 """The search for forces that take points of a picture to their keyframes, and its result.
 
->>> from wfluid import Fluid, read_picture, write_animation
->>> picture = read_picture("examples/images/cat.png")
+>>> from wfluid import Fluid, write_animation
+>>> picture = "examples/images/cat.png"
 >>> timeline = Timeline(0.5, fps=12, substeps=4)
 >>> animation = Animation(picture, Fluid(viscosity=0.005), [], timeline, cells=32, width=48)
 >>> match = match_keyframes(animation, [ParticleKeyframe((0.4, 0.5), (0.45, 0.45), time=0.5)])
 >>> match.status
 'reached'
->>> write_animation("nose.gif", match.animation.frames(), fps=12)
+>>> write_animation("nose.gif", match.animation.frames())
 [PosixPath('nose.gif')]
 
 This is the third technique of Bonilla & Velho, section III: u contains the vectors and centers of Gaussian
@@ -72,6 +72,10 @@ class Match:
     """Number of gradients computed, on both grids and over spans of any length."""
     seconds: dict[str, float]
     """Time spent [s]: simulation, adjoint, optimiser (with all other host code), total."""
+
+    def __repr__(self) -> str:
+        side = max(self.animation.picture.width, self.animation.picture.height)
+        return f"Match({self.status}, {self.residual * side:.2g} px away, {len(self.found)} forces)"
 
     @property
     def residual(self) -> float:
