@@ -1,5 +1,6 @@
 """The simple way works, and a mistake is refused in one line that says what to write."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -169,7 +170,7 @@ def test_a_centre_outside_the_picture_is_refused(make):
     with pytest.raises(ValueError, match=says):
         animate(CAT, Fluid(), make((0.5, 0.9)), 1.0)
     animate(CAT, Fluid(walls="periodic"), make((0.5, 0.9)), 1.0)
-    animate(CAT, Fluid(), make((0.5, 0.68)), 1.0)  # its flank reaches inside
+    animate(CAT, Fluid(), make((0.5, 0.66)), 1.0)
 
 
 def test_points_and_keyframes_outside_the_picture_are_refused():
@@ -219,3 +220,10 @@ def test_the_conversion_moves_a_point_by_the_arrow(device):
         picture, Fluid(viscosity=0), right, 1.0, 12, cells=60, points=[(0.5, 0.5)], device=device.alias
     )
     assert last.points[0, 0] * 60 - 30 == pytest.approx(12, rel=0.25)
+
+
+def test_what_a_search_finds_is_no_mistake():
+    """A copy with other forces may have any: the units of the first were checked."""
+    shot = Animation(CAT, Fluid(), PUSH, Timeline(1.0))
+    found = [force(center=(0.5, 0.7)), force(vector=(2000.0, 0.0))]
+    assert replace(shot, forces=found).forces == found

@@ -70,6 +70,9 @@ class Animation:
     loop: str | None = None
     """Kind of loop: "oscillate", "pingpong" or "crossfade"; None for an animation with an end."""
 
+    units_checked: bool = field(default=False, compare=False)
+    """Whether places and vectors are known not to be pixels: those of a scene, and of a changed copy."""
+
     def __post_init__(self) -> None:
         self._take_types()
         for name in ("width", "height"):
@@ -80,7 +83,8 @@ class Animation:
         if not LEAST_CELLS <= self.cells <= CELLS_LIMIT:
             raise ValueError(f"cells {self.cells}: expected {LEAST_CELLS} … {CELLS_LIMIT}")
         forces = flatten(self.forces)
-        self._check_units(forces)
+        if not self.units_checked:
+            self._check_units(forces)
         if self.loop is not None:
             check_loop(self.loop, forces)
             forces = tuple(fit_to_loop(force, self._loop_frames / self.timeline.fps) for force in forces)
@@ -112,6 +116,7 @@ class Animation:
             object.__setattr__(self, "points", (self.points,))
         for point in self.points:
             check_inside("a point", position("points", point), extent, side)
+        object.__setattr__(self, "units_checked", True)
 
     def __repr__(self) -> str:
         frames, fps = self.frame_count, self.timeline.fps

@@ -66,7 +66,9 @@ def open_output(
         return GifWriter(path, fps, encoding.background)
     if ending in movie.CODECS:
         if not movie.available():
-            raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
+            raise PictureError(
+                f"{path}: movies need PyAV; install it in the clone of wfluid: pip install -e '.[video]'"
+            )
         return MovieWriter(path, fps, encoding.background)
     kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
     raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")

@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from wfluid.domain.checks import check_number
-from wfluid.domain.paths import CONVERSION, Place, position
+from wfluid.domain.paths import CONVERSION, Place, check_no_pixels
 
 COINCIDENT = 1e-6
 """Places closer than this are the same [longer side]."""
@@ -37,7 +37,17 @@ class ParticleKeyframe:
 
     def __post_init__(self) -> None:
         for name in ("point", "destination"):
-            object.__setattr__(self, name, position(f"ParticleKeyframe.{name}", getattr(self, name)))
+            given = getattr(self, name)
+            try:
+                place = tuple(float(value) for value in given)
+            except (TypeError, ValueError):
+                raise TypeError(
+                    f"ParticleKeyframe.{name}: expected two numbers x, y, got {given!r}"
+                ) from None
+            if len(place) != 2 or not all(map(math.isfinite, place)):
+                raise ValueError(f"ParticleKeyframe.{name} {place}: expected two finite numbers")
+            check_no_pixels(f"ParticleKeyframe.{name}", place)
+            object.__setattr__(self, name, place)
         for name in ("time", "weight"):
             value = getattr(self, name)
             check_number(f"ParticleKeyframe.{name}", value)

@@ -19,9 +19,6 @@ from wfluid.model.gaussian_forces import GaussianForce
 from wfluid.model.painted import Painted
 from wfluid.model.uniform_forces import Wind
 
-MARGIN = 0.5
-"""Largest distance of a centre from the picture, in radii: from there its force still reaches inside."""
-
 ARROW = 10.0
 """Length from which the numbers of a vector may be pixels: shorter arrows are hardly drawn."""
 
@@ -78,9 +75,8 @@ def _check_center(thing: LocalForce | Source, walls: Walls, extent: tuple[float,
     if not isinstance(center, tuple | Path):
         return
     places = center.places if isinstance(center, Path) else [center]
-    margin = MARGIN * thing.radius
     for axis, size in enumerate(extent):
-        if not walls.periodic[axis] and all(not -margin <= place[axis] <= size + margin for place in places):
+        if not walls.periodic[axis] and all(not 0 <= place[axis] <= size for place in places):
             name = f"{type(thing).__name__}.{'path' if hasattr(thing, 'path') else 'center'}"
             raise ValueError(_outside(name, places[0], extent, side))
 
