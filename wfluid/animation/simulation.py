@@ -144,8 +144,10 @@ def _unconverged(divergence: float, change: float, fluid: Fluid) -> tuple[str, s
     remedy = "set solver (--solver) to multigrid"
     if fluid.scheme == "paper":
         remedy += " or scheme (--scheme) to standard"
+    seen = [AREAS] if divergence > POOR_RESIDUAL else []
+    seen += ["viscosity acts less than it should"] if change > POOR_RESIDUAL else []
     return (
-        f"{AREAS}, and viscosity acts less than it should",
+        ", and ".join(seen),
         f"{fluid.sweeps} Jacobi sweeps left {divergence:.1e} of the divergence and {change:.1e} of the "
         "viscous change, so they have not converged",
         remedy,
