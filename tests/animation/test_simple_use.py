@@ -21,6 +21,7 @@ from wfluid import (
     Oscillator,
     Painted,
     ParticleKeyframe,
+    ParticleMisfit,
     Source,
     Stroke,
     Timeline,
@@ -86,6 +87,13 @@ def force(center=(0.4, 0.3), vector=(1.0, 0.0), radius=0.06, envelope=None, **mo
     return GaussianForce(center, vector, radius, envelope or Constant(), **more)
 
 
+LOOK = ParticleKeyframe((0.4, 0.3), (0.41, 0.3), 0.25)
+
+
+def still():
+    return Animation(CAT, Fluid(), [], Timeline(0.25, 12), cells=24)
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -125,6 +133,11 @@ def test_wrong_types_are_refused_in_one_line(arguments, says):
         (lambda: Fluid(viscosity=CAT), r"a picture needs a scale: Painted\(picture"),
         (lambda: ParticleKeyframe((0.2, 0.2), (0.2, "a"), 1.0), "destination: expected two numbers"),
         (lambda: ParticleKeyframe((0.2, 0.2), (0.3, 0.2), "1"), "ParticleKeyframe.time: expected a number"),
+        (lambda: match_keyframes(still(), 3), "keyframes: expected ParticleKeyframe objects, got int"),
+        (
+            lambda: match_keyframes(still(), LOOK, pins=(0.2, 0.3)),
+            "a pin: expected two numbers x, y, got 0.2",
+        ),
         (lambda: morph(CAT, 4, [((0.2, 0.2), (0.2, 0.2))]), "b: expected a picture"),
     ],
 )
@@ -145,6 +158,7 @@ def test_wrong_types_of_parts_are_refused_in_one_line(make, says):
         lambda at: ParticleKeyframe(at, (0.5, 0.5), 1.0),
         lambda at: ParticleKeyframe((0.5, 0.5), at, 1.0),
         lambda at: morph(CAT, CAT, [(at, (0.5, 0.5))]),
+        lambda at: ParticleMisfit([(0.1, 0.1), at], [(0.5, 0.5)] * 2, time=1.0),
         lambda at: morph(CAT, CAT, [((0.5, 0.5), at)]),
         lambda at: Animation(CAT, Fluid(), PUSH, Timeline(1.0), points=[at]),
     ],

@@ -92,6 +92,12 @@ def test_images_of_pillow_are_taken():
     np.testing.assert_array_equal(np.asarray(Picture.of(Pillow("P", palette)))[..., 1], palette // 2)
     assert Picture.of(Pillow("1", palette)).pixels.shape == (4, 6, 1)
 
+    class Bare:
+        mode, size, __array_interface__ = "CMYK", (6, 4), palette.__array_interface__
+
+    with pytest.raises(TypeError, match=r'an image of mode CMYK: write image.convert\("RGB"\)'):
+        Picture.of(Bare())
+
 
 def test_a_picture_becomes_an_array_of_another_type_as_numpy_converts():
     picture = read_picture(CAT)

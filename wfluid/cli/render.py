@@ -70,7 +70,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     if options.preview:
         aims = staged.aims if isinstance(staged, StagedKeyframes) else None
         write_picture(options.preview, draw_controls(scene, staged.animation, aims))
-    beside = [str(name) for name in (options.preview, options.save_scene, options.plot) if name]
+    beside = [str(name) for name in (options.preview, options.save_scene) if name]
     if options.preview or not (scene.outputs or searched):
         _end(ending(beside, None, None, 1.0, time.perf_counter() - began), options.quiet)
         return Exit.DONE
@@ -79,6 +79,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     match = _search(searched, options) if searched else None
     if searched and match:
         _save_match(match, scene, searched, options)
+        beside += [str(options.plot)] if options.plot else []
     report = None
     if scene.outputs:
         report, run, writing = _write_frames(staged, match, outputs, options)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from wfluid.domain.paths import Place
+from wfluid.domain.paths import Place, check_no_pixels
 from wfluid.domain.showing import short_repr
 
 
@@ -186,12 +186,14 @@ def places_of(name: str, values: Any) -> np.ndarray:
     """Positions as an array (n, 2).
 
     Raises:
-        ValueError: another shape, or a number that is not finite.
+        ValueError: another shape, a number that is not finite, or places that look like pixels.
     """
     values = np.array(values, dtype=np.float64) if np.size(values) else np.empty((0, 2))  # a copy
     if values.ndim != 2 or values.shape[1] != 2:
         raise ValueError(f"{name} of shape {values.shape}: expected (n, 2)")
-    return finite_array(name, values, values.shape)
+    for at in finite_array(name, values, values.shape):
+        check_no_pixels(name, (at[0], at[1]))
+    return values
 
 
 def finite_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

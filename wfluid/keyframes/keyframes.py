@@ -37,13 +37,7 @@ class ParticleKeyframe:
 
     def __post_init__(self) -> None:
         for name in ("point", "destination"):
-            given = getattr(self, name)
-            try:
-                place = tuple(float(value) for value in given)
-            except (TypeError, ValueError):
-                raise TypeError(
-                    f"ParticleKeyframe.{name}: expected two numbers x, y, got {given!r}"
-                ) from None
+            place = _two_numbers(f"ParticleKeyframe.{name}", getattr(self, name))
             if len(place) != 2 or not all(map(math.isfinite, place)):
                 raise ValueError(f"ParticleKeyframe.{name} {place}: expected two finite numbers")
             check_no_pixels(f"ParticleKeyframe.{name}", place)
@@ -53,6 +47,18 @@ class ParticleKeyframe:
             check_number(f"ParticleKeyframe.{name}", value)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"ParticleKeyframe.{name} {value}: expected a positive number")
+
+
+def _two_numbers(name: str, given: object) -> Place:
+    """A place, whose numbers may be wrong.
+
+    Raises:
+        TypeError: something other than numbers.
+    """
+    try:
+        return tuple(float(value) for value in given)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected two numbers x, y, got {given!r}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +95,7 @@ def targets_of(
     """
     if not keyframes:
         raise ValueError("no keyframes: say where at least one point should be")
-    pins = [tuple(float(value) for value in pin) for pin in pins]
+    pins = [_two_numbers("a pin", pin) for pin in pins]
     moved: dict[Place, list[ParticleKeyframe]] = {}
     for keyframe in keyframes:
         for what, place in (("point", keyframe.point), ("destination", keyframe.destination)):

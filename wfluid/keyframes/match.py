@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wfluid.animation.animation import Animation
+from wfluid.domain.checks import listed
 from wfluid.domain.limits import TOLERANCE
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -90,7 +91,7 @@ class Match:
 
 def match_keyframes(
     animation: Animation,
-    keyframes: Sequence[ParticleKeyframe],
+    keyframes: ParticleKeyframe | Sequence[ParticleKeyframe],
     *,
     pins: Sequence[Place] = (),
     free: Sequence[Free] = (),
@@ -129,6 +130,7 @@ def match_keyframes(
         raise ValueError(f"tolerance {tolerance}: expected a positive number")
     animation = replace(animation, fluid=_solved_surely(animation.fluid))
     grid, timeline = animation.grid, animation.timeline
+    keyframes = listed("keyframes", keyframes, ParticleKeyframe, "ParticleKeyframe objects")
     keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
     particles = targets_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
     for t in sorted({t for particle in particles for t in particle.times}):

@@ -112,6 +112,8 @@ def _array(thing: Any) -> np.ndarray:
         wanted = thing.mode if thing.mode in KEPT_MODES else MODES.get(thing.mode, "RGB")
         if "transparency" in getattr(thing, "info", {}):
             wanted = "RGBA"
+        if thing.mode != wanted and not hasattr(thing, "convert"):
+            raise TypeError(f'an image of mode {thing.mode}: write image.convert("{wanted}")')
         thing = thing if thing.mode == wanted else thing.convert(wanted)
     elif not hasattr(thing, "__array_interface__") and not hasattr(thing, "__array__"):
         raise TypeError(
