@@ -1,10 +1,11 @@
 """wfluid: animate, warp and morph pictures by treating them as a fluid.
 
->>> from wfluid import Fluid, GaussianForce, Oscillator, animate, read_picture, write_animation
->>> picture = read_picture("examples/images/raccoon.jpg")
+>>> from wfluid import Fluid, GaussianForce, Oscillator, animate, write_animation
 >>> nose = GaussianForce((0.61, 0.44), (1.5, 1.0), 0.06, Oscillator(period=1.0))
->>> frames = animate(picture, Fluid(viscosity=0.001), [nose], duration=0.25, cells=64, width=160)
->>> write_animation("nose.gif", frames, fps=24)
+>>> frames = animate("examples/images/raccoon.jpg", Fluid(), nose, duration=0.25, cells=64)
+>>> frames
+Run(7 frames at 24 per second)
+>>> write_animation("nose.gif", frames)
 [PosixPath('nose.gif')]
 
 One unit of length is the picture's longer side, one unit of time a second; x points right, y down.

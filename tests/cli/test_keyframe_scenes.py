@@ -205,7 +205,7 @@ def test_what_cannot_be_reached_is_finished_and_said(folder, capsys):
     )
     said = capsys.readouterr().err
     assert code == 1 and (folder / "a.gif").exists()
-    assert "unreachable: the largest residual is" in said and "0,0 to 9,9 at 0.25 s: " in said
+    assert "unreachable: the farthest point is " in said and "0,0 to 9,9 at 0.25 s: " in said
     assert "it lies in a corner" in said and "30,20 to" not in said
 
 
@@ -271,5 +271,5 @@ def test_an_interrupt_ends_the_search_with_the_best_so_far(folder, capsys, monke
     moves = ("--move", "8,8:13,12", "--move", "50,20:44,23")
     assert main(["keyframes", "small.png", "-o", "a.gif", *moves, *QUICK]) == 130
     said = capsys.readouterr().err
-    assert "stopped: the largest residual is" in said and "8,8 to 13,12 at 0.25 s: " in said
+    assert "stopped: the farthest point is " in said and "8,8 to 13,12 at 0.25 s: " in said
     assert (folder / "a.gif").exists() and len(seen) == 3

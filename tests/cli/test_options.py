@@ -230,7 +230,7 @@ FLAGS = {
 }
 """By flag: what follows it, and the tables that it makes."""
 
-OF_A_RUN = {"--help", "--save-scene", "--preview", "--dry-run", "--device", "--quiet"}
+OF_A_RUN = {"--help", "--save-scene", "--preview", "--dry-run", "--device", "--quiet", "--verbose"}
 """Flags that no scene has."""
 
 

@@ -323,7 +323,7 @@ def test_movies_without_pyav_say_how_to_get_it(small, tmp_path):
     code = "import sys; sys.modules['av'] = None; from wfluid.cli.main import main; sys.exit(main())"
     command = [sys.executable, "-c", code, "animate", small, "-o", tmp_path / "a.mp4", *PUSH]
     result = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    assert result.returncode == 2 and "pip install 'wfluid[video]'" in result.stderr
+    assert result.returncode == 2 and "pip install -e '.[video]'" in result.stderr
 
 
 def test_the_preview_draws_and_runs_nothing(small, tmp_path):

@@ -248,7 +248,8 @@ def test_saving_a_scene_alone_runs_nothing(folder, capsys, monkeypatch):
     """It says what its pixels refer to, so that a picture of another size may take its place."""
     monkeypatch.setattr("wfluid.cli.render.write_frames", lambda *_: pytest.fail("frames are made"))
     assert main(["animate", "small.png", "--push", "30,20:5,0", "--save-scene", "x.toml"]) == 0
-    assert capsys.readouterr() == ("", "")
+    said = capsys.readouterr()
+    assert said.out.startswith("wrote x.toml in ") and said.out.count("\n") == 1 and said.err == ""
     assert read_scene("x.toml").tables == {
         "wfluid": 1,
         "picture": {"size": [60, 40], "file": "small.png"},

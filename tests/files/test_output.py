@@ -7,6 +7,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
+from wfluid import Animation, Fluid, GaussianForce, Timeline, write_picture
 from wfluid.files import movie, output
 from wfluid.files.gif import delays, set_delays
 from wfluid.files.names import numbering
@@ -156,4 +157,47 @@ def test_an_abandoned_animation_leaves_no_gif(tmp_path):
 
     with pytest.raises(RuntimeError):
         output.write_animation(tmp_path / "a.gif", breaks(), 10)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def shot():
+    """Three frames at 10 a second of an 8 x 6 picture."""
+    picture = np.random.default_rng(0).random((6, 8, 3))
+    push = GaussianForce((0.5, 0.4), (1.0, 0.0), 0.2)
+    return Animation(picture, Fluid(), push, Timeline(0.2, 10), cells=8)
+
+
+@pytest.mark.parametrize("of", ["run", "list", "every other", "generator", "backwards"])
+def test_frames_know_their_rate(shot, tmp_path, of):
+    """A run says it; frames have times, and every other one of them is half as many a second."""
+    frames = {
+        "run": lambda: shot.frames(),
+        "list": lambda: list(shot.frames()),
+        "every other": lambda: list(shot.frames())[::2],
+        "generator": lambda: (frame for frame in shot.frames()),
+        "backwards": lambda: list(shot.frames())[::-1],
+    }[of]()
+    assert shot.frames().fps == 10
+    output.write_animation(tmp_path / "a.gif", frames)
+    waits = set(gif_delays((tmp_path / "a.gif").read_bytes()))
+    assert waits == {20 if of == "every other" else 10}
+
+
+def test_a_given_rate_and_that_of_plain_pictures(shot, tmp_path):
+    """Arrays, paths and pictures are frames too; they have no times."""
+    output.write_animation(tmp_path / "a.gif", shot.frames(), 20)
+    assert set(gif_delays((tmp_path / "a.gif").read_bytes())) == {5}
+    codes = np.zeros((6, 8, 3), np.uint8)
+    write_picture(tmp_path / "one.png", codes)
+    for frames in ([codes, codes + 200], [tmp_path / "one.png", Picture.of(codes)], np.stack([codes, codes])):
+        output.write_animation(tmp_path / "b.gif", frames, 10)
+        assert oiio.ImageInput.open(str(tmp_path / "b.gif")).seek_subimage(1, 0)
+    assert output.write_animation(tmp_path / "c.gif", [codes]) == [tmp_path / "c.gif"]
+
+
+@pytest.mark.parametrize("frames", [3, "a.png", np.zeros((6, 8, 3), np.uint8), [3]])
+def test_frames_that_are_none_are_refused_in_one_line(tmp_path, frames):
+    with pytest.raises(TypeError, match="frames: expected"):
+        output.write_animation(tmp_path / "a.gif", frames)
     assert list(tmp_path.iterdir()) == []

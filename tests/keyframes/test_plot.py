@@ -260,7 +260,7 @@ def test_without_matplotlib_one_line_says_what_to_install(tmp_path, monkeypatch)
     for ask in (check_plot, lambda path: plot_match(None, path)):
         with pytest.raises(ValueError) as refusal:
             ask(tmp_path / "a.png")
-        expected = "plots need matplotlib; install it with: pip install 'wfluid[plot]'"
+        expected = "plots need matplotlib; install it in the clone of wfluid: pip install -e '.[plot]'"
         assert str(refusal.value) == f"{tmp_path / 'a.png'}: {expected}"
     assert not list(tmp_path.iterdir())
 

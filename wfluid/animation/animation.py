@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
@@ -14,11 +16,13 @@ from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.domain.checks import check_whole
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import CELLS, CELLS_LIMIT, FPS, LEAST_CELLS, SIZE_LIMIT
+from wfluid.domain.paths import position
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.device import open_device
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, flatten
-from wfluid.pictures.picture import Picture
+from wfluid.model.units import check_inside, check_units
+from wfluid.pictures.picture import Picture, PictureLike, picture_of
 from wfluid.pictures.sampling import EDGE, FILTER, check_look_up
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
@@ -34,15 +38,17 @@ class Animation:
     Frames are computed one by one when they are requested, and are not stored.
 
     Raises:
-        ValueError: a value outside its range, or a loop that does not suit the forces.
+        TypeError: a value of another type; the message says what to write.
+        ValueError: a value outside its range, a centre outside the picture, a vector that looks like pixels,
+            or a loop that does not suit the forces.
     """
 
     picture: Picture
-    """The picture that is animated."""
+    """The picture that is animated; anything that `Picture.of` takes."""
     fluid: Fluid
     """Viscosity, walls, densities and numerical scheme."""
-    forces: Sequence[Force | Group]
-    """Forces and groups of forces on the fluid."""
+    forces: Force | Group | Sequence[Force | Group]
+    """Forces and groups of forces on the fluid; one needs no list."""
     timeline: Timeline
     """Duration, frame rate and steps per frame."""
     cells: int = CELLS
@@ -58,23 +64,62 @@ class Animation:
     device: str | None = None
     """"cpu" (default), "cuda", "cuda:1", …"""
     layers: Mapping[str, Picture] = field(default_factory=dict)
-    """Further pictures and mattes warped by the same map, stretched over the picture, by name."""
+    """Further pictures and mattes warped by the same map, stretched over the picture, by name; anything that
+    `Picture.of` takes."""
     points: Sequence[tuple[float, float]] = ()
     """Positions x, y of points of the picture that are tracked [longer side]."""
     loop: str | None = None
     """Kind of loop: "oscillate", "pingpong" or "crossfade"; None for an animation with an end."""
 
+    units_checked: bool = field(default=False, compare=False)
+    """Whether places and vectors are known not to be pixels: those of a scene, and of a changed copy."""
+
     def __post_init__(self) -> None:
+        self._take_types()
         for name in ("width", "height"):
             if getattr(self, name) is not None:
                 check_whole(name, getattr(self, name), 1, SIZE_LIMIT, " pixels")
         check_look_up(self.filter, self.edge)
         check_whole("cells", self.cells, LEAST_CELLS, CELLS_LIMIT)
         forces = flatten(self.forces)
+        if not self.units_checked:
+            self._check_units(forces)
         if self.loop is not None:
             check_loop(self.loop, forces)
             forces = tuple(fit_to_loop(force, self._loop_frames / self.timeline.fps) for force in forces)
         object.__setattr__(self, "_acting", forces)
+
+    def _take_types(self) -> None:
+        """Make pictures of what is given as one, and check the other types."""
+        object.__setattr__(self, "picture", picture_of("picture", self.picture))
+        if not isinstance(self.fluid, Fluid):
+            given = type(self.fluid).__name__
+            raise TypeError(f"fluid: expected a Fluid, such as Fluid(viscosity=0.001), got {given}")
+        if not isinstance(self.timeline, Timeline):
+            given = type(self.timeline).__name__
+            raise TypeError(f"timeline: expected a Timeline, such as Timeline(2.0, fps=24), got {given}")
+        if not isinstance(self.layers, Mapping):
+            given = type(self.layers).__name__
+            raise TypeError(f'layers: expected pictures by name, such as {{"matte": picture}}, got {given}')
+        layers = {name: picture_of(f"layer {name}", layer) for name, layer in self.layers.items()}
+        object.__setattr__(self, "layers", layers)
+        if isinstance(self.forces, Force | Group):
+            object.__setattr__(self, "forces", (self.forces,))
+
+    def _check_units(self, forces: Sequence[Force]) -> None:
+        """Refuse places outside the picture, and vectors in pixels."""
+        picture, grid = self.picture, self.grid
+        extent, side = (grid.width, grid.height), max(picture.width, picture.height)
+        check_units(forces, self.fluid, extent, side, self.timeline.end)
+        if np.ndim(self.points) == 1 and len(self.points) == 2:
+            object.__setattr__(self, "points", (self.points,))
+        for point in self.points:
+            check_inside("a point", position("points", point), extent, side)
+        object.__setattr__(self, "units_checked", True)
+
+    def __repr__(self) -> str:
+        frames, fps = self.frame_count, self.timeline.fps
+        return f"Animation({self.picture}, {len(self._acting)} forces, {frames} frames at {fps:g} per second)"
 
     @property
     def _loop_frames(self) -> int:
@@ -119,7 +164,7 @@ class Animation:
     def frames(self) -> Run[Frame]:
         """A run of the animation from rest: an iterator of its frames, with computing times and the seam."""
         seconds, seam = RunTimes(), None if self.loop is None else Seam()
-        return Run(self._frames(seconds, seam), self.frame_count, seconds, seam)
+        return Run(self._frames(seconds, seam), self.frame_count, self.timeline.fps, seconds, seam)
 
     def _frames(self, seconds: RunTimes, seam: Seam | None) -> Iterator[Frame]:
         clock, walls = time.perf_counter, self.fluid.walls
@@ -157,9 +202,9 @@ class Animation:
 
 
 def animate(
-    picture: Picture,
+    picture: PictureLike,
     fluid: Fluid,
-    forces: Sequence[Force | Group],
+    forces: Force | Group | Sequence[Force | Group],
     duration: float,
     fps: float = FPS,
     substeps: int | None = None,
@@ -167,10 +212,14 @@ def animate(
 ) -> Run[Frame]:
     """Frames of `picture` moved by `forces` for `duration` seconds, computed when they are requested.
 
+    `picture` is anything that `Picture.of` takes, such as a path; one force needs no list.
+    The frames know their rate, `fps`.
+
     `settings` are those of `Animation`: cells, width, height, filter, edge, device, layers, points, loop.
 
     Raises:
-        ValueError: a value outside its range; the message names it and the range.
+        TypeError: a value of another type; the message says what to write.
+        ValueError: as `Animation`.
     """
     timeline = Timeline(duration, fps, substeps)
-    return Animation(picture, fluid, tuple(forces), timeline, **settings).frames()
+    return Animation(picture_of("picture", picture), fluid, flatten(forces), timeline, **settings).frames()

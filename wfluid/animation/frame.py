@@ -34,3 +34,6 @@ class Frame:
     """The densities at the grid's centres, (ny, nx), by name."""
     points: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
     """Positions of the tracked points [longer side], (n, 2), x and y."""
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.index}, {self.time:.6g} s, {self.picture})"

@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
+from wfluid.domain.limits import FPS
 
 QUEUED_FRAMES = 4
 """Largest number of frames that wait to be written while the next are computed."""
@@ -33,10 +34,15 @@ class Run(Generic[ShownFrame]):
     """Iterator of the remaining frames."""
     frame_count: int
     """Total number of frames."""
+    fps: float = FPS
+    """Frame rate [1/s]."""
     seconds: RunTimes = field(default_factory=RunTimes)
     """Time spent on the frames so far."""
     seam: Seam | None = None
     """Difference between end and beginning of a loop, measured after the last frame; None without a loop."""
+
+    def __repr__(self) -> str:
+        return f"Run({self.frame_count} frames at {self.fps:g} per second)"
 
     def __iter__(self) -> Iterator[ShownFrame]:
         return self

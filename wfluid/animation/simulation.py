@@ -26,6 +26,11 @@ POOR_RESIDUAL = 0.02
 class PoorSolveWarning(UserWarning):
     """A solve's residual is too large; the message has the number and the remedy."""
 
+    def __init__(self, index: int, seen: str, number: str, remedy: str):
+        super().__init__(f"frame {index}: {seen}: {number}; {remedy} (said once)")
+        self.plain = f"frame {index}: {seen}; {remedy} (said once)"
+        """The message without the number."""
+
 
 @dataclass(frozen=True)
 class SimulatedFrame:
@@ -93,14 +98,18 @@ def _judge(solve: SolveReport, fluid: Fluid, index: int, t: float, warned: bool)
         )
     if warned:
         return warned
-    text = _poor(solve, fluid, t)
-    if text:
-        warnings.warn(f"frame {index}: {text} (said once)", PoorSolveWarning, stacklevel=2)
-    return bool(text)
+    poor = _poor(solve, fluid, t)
+    if poor:
+        warnings.warn(PoorSolveWarning(index, *poor), stacklevel=2)
+    return bool(poor)
 
 
-def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
-    """A warning of a large residual, with the remedy; None if there is none."""
+AREAS = "some areas grow or shrink that should not"
+"""What is seen of divergence that is left."""
+
+
+def _poor(solve: SolveReport, fluid: Fluid, t: float) -> tuple[str, str, str] | None:
+    """Of a large residual what is seen of it, the number and the remedy; None if there is none."""
     pressure, diffusion = solve.pressure, solve.diffusion
     if pressure.method == "jacobi":
         return _unconverged(pressure.relative, diffusion.relative, fluid)
@@ -108,30 +117,38 @@ def _poor(solve: SolveReport, fluid: Fluid, t: float) -> str | None:
         left = f"the projection left {pressure.relative:.1e} of the divergence after {pressure.iterations}"
         if pressure.method == "multigrid":
             more = f"set pressure_cycles (--pressure-cycles) to {fluid.pressure_cycles + 2}"
-            return f"{left} cycles; {more}"
-        return f"{left} iterations; soften the edges of the freeze mask"
+            return AREAS, f"{left} cycles", more
+        return f"{AREAS}, beside what is frozen", f"{left} iterations", "soften the edges of the freeze mask"
     if diffusion.unfinished:
         return (
-            f"the diffusion left {diffusion.relative:.1e} of its change after "
-            f"{diffusion.iterations} iterations; "
-            "lower the contrast of the viscosity, soften its edges, or use more substeps"
+            "stiff parts may move by a little less or more than they should",
+            f"the diffusion left {diffusion.relative:.1e} of its change after {diffusion.iterations} "
+            "iterations",
+            "lower the contrast of the viscosity, soften its edges, or use more substeps",
         )
     excess = solve.map_loss / (fluid.diffusion_loss * max(1.0, t))
     if excess > MARGIN:
-        left = f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side"
         less = fluid.diffusion_tolerance / excess
-        return f"{left}; set diffusion_tolerance (--diffusion-tolerance) to {less:.1e}"
+        return (
+            f"places may be off by {100 * solve.map_loss:.2g} % of the longer side",
+            f"the diffusion's solves may have moved places by {solve.map_loss:.1e} of the longer side",
+            f"set diffusion_tolerance (--diffusion-tolerance) to {less:.1e}",
+        )
     return None
 
 
-def _unconverged(divergence: float, change: float, fluid: Fluid) -> str | None:
-    """A warning of the parts of divergence and viscous change that Jacobi sweeps left, if one is large."""
+def _unconverged(divergence: float, change: float, fluid: Fluid) -> tuple[str, str, str] | None:
+    """As `_poor`, of the parts of divergence and viscous change that Jacobi sweeps left, if one is large."""
     if max(divergence, change) <= POOR_RESIDUAL:
         return None
     remedy = "set solver (--solver) to multigrid"
     if fluid.scheme == "paper":
         remedy += " or scheme (--scheme) to standard"
+    seen = [AREAS] if divergence > POOR_RESIDUAL else []
+    seen += ["viscosity acts less than it should"] if change > POOR_RESIDUAL else []
     return (
+        ", and ".join(seen),
         f"{fluid.sweeps} Jacobi sweeps left {divergence:.1e} of the divergence and {change:.1e} of the "
-        f"viscous change: they have not converged; {remedy}"
+        "viscous change, so they have not converged",
+        remedy,
     )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -48,7 +50,8 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
         objective = f"misfit of {len(aims.keyframes)} keyframes"
     print(f"{grid.nx} x {grid.ny} cells, {steps} steps, {Real.__name__}: {objective}")
     print(f"{'variable':44s} {'size':>6s} {'|gradient|':>11s} {'remainder':>10s} {'rate':>9s}")
-    wrong = 0
+    wrong, began = 0, time.perf_counter()
+    rates: list[float] = []
     for rate in taylor_rates(functional, seed=seed):
         shown = f"{rate.rate:.3f}"
         if not np.isfinite(rate.rate):
@@ -57,6 +60,12 @@ def check_gradient(scene: Scene, cells: int, device: str | None, seed: int) -> i
         numbers = f"{rate.size:6d} {rate.gradient:11.3e} {rate.remainder:10.1e} {shown:>9s}"
         print(f"{rate.name:44s} {numbers}{verdict}", flush=True)
         wrong += not rate.holds
+        rates.append(rate.rate)
+    worst = min(filter(np.isfinite, rates), default=math.inf)
+    lowest = f", the lowest rate is {worst:.3f}" if np.isfinite(worst) else ""
+    seconds = time.perf_counter() - began
+    text = f"{len(rates)} variables tested in {seconds:.1f} s, {wrong} wrong{lowest}; nothing was written"
+    print(text, file=sys.stderr)
     return Exit.FAILED if wrong else Exit.DONE
 
 

@@ -6,6 +6,7 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
+from wfluid.cli.hints import BY_FLAGS
 from wfluid.files.names import check_folder, files_written
 from wfluid.keyframes.plot import check_plot
 from wfluid.pictures.formats import PictureError
@@ -20,7 +21,9 @@ class RunOptions:
     device: str | None = None
     """Device: "cpu" (default), "cuda", …"""
     quiet: bool = False
-    """Whether to print no progress and no notes."""
+    """Whether to print no progress, no notes and no last line."""
+    verbose: bool = False
+    """Whether messages have residuals, iterations and objectives too."""
     dry_run: bool = False
     """Whether to print the plan and stop."""
     preview: str | None = None
@@ -31,6 +34,8 @@ class RunOptions:
     """File for a figure of the search for keyframes."""
     points: str | None = None
     """File that the moves were read from."""
+    verb: str = "animate"
+    """The command."""
 
 
 def check_run(scene: Scene, options: RunOptions) -> None:
@@ -42,11 +47,14 @@ def check_run(scene: Scene, options: RunOptions) -> None:
         SceneError: settings of an output that its format does not have.
     """
     if not (scene.forces or scene.densities or scene.keyframes):
-        raise ValueError("nothing moves the picture: give at least one --push X,Y:DX,DY, or a [[force]]")
+        drawn = options.verb in BY_FLAGS
+        remedy = "give at least one --push X,Y:DX,DY" if drawn else "add a [[force]] to the scene"
+        raise ValueError(f"nothing moves the picture: {remedy}")
     if options.plot:
         if not scene.keyframes:
             raise ValueError(
-                "--plot draws the search for keyframes, and the scene has none: give --move, or leave it out"
+                "--plot draws the search for keyframes, and the scene has none: add [[keyframes.move]], "
+                "or leave it out"
             )
         logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it tells of its own folders
         check_plot(options.plot)

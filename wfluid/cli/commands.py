@@ -62,6 +62,8 @@ def _run(scene: Scene, options: argparse.Namespace) -> int:
     run = RunOptions(
         device=options.device,
         quiet=options.quiet,
+        verbose=options.verbose,
+        verb=options.verb,
         dry_run=options.dry_run,
         preview=options.preview,
         save_scene=getattr(options, "save_scene", None),

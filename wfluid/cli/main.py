@@ -8,8 +8,10 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from wfluid.cli.exits import Exit
+from wfluid.cli.hints import fitted_hint
 from wfluid.cli.parser import build_parser
 from wfluid.cli.streams import safe_streams
 
@@ -37,21 +39,24 @@ def _run(words: Sequence[str]) -> int:
     options.arguments = words
     warnings.simplefilter("ignore")
     warnings.filterwarnings("always", module="wfluid")
-    warnings.showwarning = _show_warning
+    verbose = getattr(options, "verbose", False)
+
+    def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+        text = str(message) if verbose else getattr(message, "plain", message)
+        print(f"wfluid: warning: {fitted_hint(options.verb, str(text))}", file=sys.stderr)
+
+    warnings.showwarning = show_warning
     try:
         return options.run(options)
     except ValueError as error:
-        print(f"wfluid {options.verb}: {error}", file=sys.stderr)
+        print(f"wfluid {options.verb}: {fitted_hint(options.verb, str(error))}", file=sys.stderr)
         return Exit.INPUT
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except (RuntimeError, ArithmeticError, OSError, MemoryError) as error:
-        print(f"wfluid {options.verb}: failed: {error or type(error).__name__}", file=sys.stderr)
+        why = fitted_hint(options.verb, str(error)) or type(error).__name__
+        print(f"wfluid {options.verb}: failed: {why}", file=sys.stderr)
         return Exit.FAILED
-
-
-def _show_warning(message, *_, **__) -> None:
-    print(f"wfluid: warning: {message}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -13,10 +13,19 @@ from wfluid.animation.estimate import check_memory, estimate
 from wfluid.animation.run import Run
 from wfluid.cli.checks import RunOptions, check_run
 from wfluid.cli.exits import Exit
+from wfluid.cli.hints import fitted_hint
 from wfluid.cli.progress import SearchProgress
 from wfluid.cli.report import Report, write_report
-from wfluid.cli.verdicts import judge_folds, judge_loop, judge_match
-from wfluid.cli.writing import Output, kept_frames, notes_of_outputs, open_writers, write_frames
+from wfluid.cli.verdicts import ending, judge_folds, judge_loop, judge_match
+from wfluid.cli.writing import (
+    Output,
+    finished,
+    kept_frames,
+    near,
+    notes_of_outputs,
+    open_writers,
+    write_frames,
+)
 from wfluid.fields.device import kernels_are_built, open_device
 from wfluid.keyframes.match import STOPPED, Match, match_keyframes
 from wfluid.keyframes.plot import plot_match
@@ -48,7 +57,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     notes += notes_of_outputs(scene, first, staged.animation.layers)
     without_run = bool(options.preview or options.dry_run)
     outputs = [] if without_run else open_writers(scene, staged.animation)
-    note = _note(options.quiet)
+    note = _note(options)
     for text in notes:  # only now: an error above is a single line
         note(text)
 
@@ -60,16 +69,20 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
         write_picture(options.preview, draw_controls(scene, staged.animation, aims))
     if options.dry_run:
         _print_plan(scene, staged)
+        return Exit.DONE
+    beside = [str(name) for name in (options.preview, options.save_scene) if name]
     if without_run or not (scene.outputs or searched):
+        _end(ending(beside, None, None, 1.0, time.perf_counter() - began), options.quiet)
         return Exit.DONE
 
     compiling = _load_kernels(staged.animation, options.quiet)
-    match = _search(searched, options.quiet) if searched else None
+    match = _search(searched, options) if searched else None
     if searched and match:
         _save_match(match, scene, searched, options)
+        beside += [str(options.plot)] if options.plot else []
     report = None
     if scene.outputs:
-        report, run, writing = _write_frames(staged, match, outputs, options.quiet)
+        report, run, writing = _write_frames(staged, match, outputs, options)
         seconds = {
             "compile": compiling,
             "simulate": run.seconds.simulate,
@@ -80,17 +93,28 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
         for output in scene.outputs:
             if output.of == "report":
                 write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
-    return _verdict(searched, match, report) if searched and match else Exit.DONE
+                beside.append(near(scene.folder / output.file))
+    code = _verdict(searched, match, report, options.verbose) if searched and match else Exit.DONE
+    side = searched.aims.side if searched else 1.0
+    names = [*finished(outputs), *beside]
+    _end(ending(names, report, match, side, time.perf_counter() - began), options.quiet)
+    return code
 
 
-def _note(quiet: bool) -> Callable[[str], None]:
+def _note(options: RunOptions) -> Callable[[str], None]:
     """A function that prints a note on stderr; prints nothing if quiet."""
 
     def note(text: str) -> None:
-        if not quiet:
-            print(f"wfluid: note: {text}", file=sys.stderr)
+        if not options.quiet:
+            print(f"wfluid: note: {fitted_hint(options.verb, text)}", file=sys.stderr)
 
     return note
+
+
+def _end(text: str, quiet: bool) -> None:
+    """Print the last line of a command, on stdout."""
+    if not quiet:
+        print(text)
 
 
 def _morph_frames(staged: Staged) -> int | None:
@@ -140,10 +164,11 @@ def _load_kernels(animation: Animation, quiet: bool) -> float:
     return seconds
 
 
-def _search(staged: StagedKeyframes, quiet: bool) -> Match:
+def _search(staged: StagedKeyframes, options: RunOptions) -> Match:
     """Find the forces of keyframes and show progress; Ctrl-C ends the search with the best forces so far."""
     aims = staged.aims
-    with HeldInterrupt() as interrupt, SearchProgress(aims.side, quiet) as show:
+    quiet, shown = options.quiet, SearchProgress(aims.side, options.quiet, verbose=options.verbose)
+    with HeldInterrupt() as interrupt, shown as show:
 
         def advance(at: Progress) -> bool:
             show(at)
@@ -179,16 +204,16 @@ def _save_match(match: Match, scene: Scene, staged: StagedKeyframes, options: Ru
 
 
 def _write_frames(
-    staged: Staged, match: Match | None, outputs: list[Output], quiet: bool
+    staged: Staged, match: Match | None, outputs: list[Output], options: RunOptions
 ) -> tuple[Report, Run, float]:
     """Compute and write the frames; returns their report, the run, and the seconds spent writing."""
-    note = _note(quiet)
+    note = _note(options)
     animation = match.animation if match else staged.animation
     morph = Morph(match, staged.pair, staged.settings) if match and isinstance(staged, StagedMorph) else None
     side = staged.aims.side if isinstance(staged, StagedKeyframes) else 1.0
     report = Report(animation, match, side, morph)
     run = (morph or animation).frames()
-    writing = write_frames(run, outputs, report, quiet)
+    writing = write_frames(run, outputs, report, options.quiet)
     for text in morph.notes if morph else ():
         note(text)
     if run.seam:
@@ -196,8 +221,9 @@ def _write_frames(
     return report, run, writing
 
 
-def _verdict(staged: StagedKeyframes, match: Match, report: Report | None) -> Exit:
+def _verdict(staged: StagedKeyframes, match: Match, report: Report | None, verbose: bool) -> Exit:
     """Whether all points reach their targets, and no frame of the picture folds."""
     least = min(match.jacobian[0], report.of_b[0] if report else math.inf)
     folds = judge_folds(least)
-    return judge_match(match, staged.aims.side, timed=not isinstance(staged, StagedMorph)) or folds
+    timed = not isinstance(staged, StagedMorph)
+    return judge_match(match, staged.aims.side, timed, verbose) or folds

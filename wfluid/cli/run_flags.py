@@ -19,6 +19,9 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", metavar="FILE.json", help="write settings, times and quality measures as JSON"
     )
+    parser.add_argument(
+        "--verbose", action="store_true", help="add residuals, iterations and objectives to the messages"
+    )
     add_device(parser)
 
 
@@ -31,7 +34,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 def add_device(parser: argparse.ArgumentParser) -> None:
     """Add the flags for device and progress."""
     parser.add_argument("--device", default=None, help="cpu, cuda, cuda:1, … (cpu)")
-    parser.add_argument("--quiet", action="store_true", help="print no progress and no notes on stderr")
+    parser.add_argument("--quiet", action="store_true", help="print no progress, notes and last line")
 
 
 def repeated(metavar: str, text: str) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import Seam
@@ -15,12 +15,14 @@ STREAMED = 0.5
 """Largest drift of an oscillating loop without a note, relative to the largest displacement."""
 
 
-def judge_match(match: Match, side: float, timed: bool) -> Exit:
+def judge_match(match: Match, side: float, timed: bool, verbose: bool = False) -> Exit:
     """Print the points that miss their targets, with the times of keyframes if `timed`."""
     if match.status == REACHED:
         return Exit.DONE
     worst, allowed = (f"{length * side:.3g} px" for length in (match.residual, match.tolerance))
-    text = f"the largest residual is {worst}: expected at most {allowed}"
+    text = f"the farthest point is {worst} from its target: at most {allowed} are allowed"
+    if verbose:
+        text += f" (after {match.iterations} iterations and {match.evaluations} evaluations)"
     print(f"wfluid: {match.status}: {text}", file=sys.stderr)
     for arrival in match.arrivals:
         if arrival.residual > match.tolerance:
@@ -35,6 +37,25 @@ def judge_folds(least: float) -> Exit:
     remedy = "leave out points whose paths pass close to each other, or use more cells"
     print(f"wfluid: the picture folds, its smallest det J is {least:.2g}: {remedy}", file=sys.stderr)
     return Exit.FAILED
+
+
+def ending(
+    written: Sequence[str], report: Report | None, match: Match | None, side: float, seconds: float
+) -> str:
+    """The last line of a command: what was written, how long it took, and the worst figures.
+
+    `side` is the longer side in the scene's pixels.
+    """
+    text = f"wrote {', '.join(written) or 'nothing'} in {seconds:.1f} s"
+    figures = []
+    if report:
+        text += f", {report.frames} frame{'s' if report.frames > 1 else ''}"
+        seen = report.extremes
+        figures.append(f"moved by at most {seen['displacement_max_px']:.3g} px")
+        figures.append(f"areas {seen['jacobian_min']:.2f} … {seen['jacobian_max']:.2f} of what they were")
+    if match:
+        figures.append(f"the farthest point {match.residual * side:.3g} px from its target")
+    return f"{text}: {', '.join(figures)}" if figures else text
 
 
 def judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[[str], None]) -> None:

@@ -143,7 +143,7 @@ def write_frames(
     except KeyboardInterrupt:
         for writer, _ in writers:
             writer.close()  # keep the frames so far: a movie ends at its last frame
-        print(f"interrupted; finished: {_finished(writers)}", file=sys.stderr)
+        print(f"interrupted; finished: {', '.join(finished(writers)) or 'nothing'}", file=sys.stderr)
         raise
     except BaseException:
         for writer, _ in writers:
@@ -151,10 +151,15 @@ def write_frames(
         raise
 
 
-def _finished(writers: Sequence[Output]) -> str:
-    """The complete files; of a sequence the first and the last."""
+def finished(writers: Sequence[Output]) -> list[str]:
+    """The complete files of each output; of a sequence the first and the last."""
     found = []
     for writer, _ in writers:
-        ends = [str(path) for path in writer.written[:1] + writer.written[1:][-1:]]
+        ends = [near(path) for path in writer.written[:1] + writer.written[1:][-1:]]
         found.append((" … " if len(writer.written) > 2 else ", ").join(ends))
-    return ", ".join(filter(None, found)) or "nothing"
+    return list(filter(None, found))
+
+
+def near(path: Path) -> str:
+    """A name as seen from the working directory, if it lies below it."""
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from numbers import Integral
+from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
+from typing import Any
 
 
 def check_word(name: str, value: object, known: Sequence[str], error: type[ValueError] = ValueError) -> None:
@@ -26,3 +27,29 @@ def check_whole(name: str, value: object, least: int, most: int, unit: str = "")
         raise ValueError(f"{name} {value!r}: expected a whole number, {least} … {most}{unit}")
     if not least <= int(value) <= most:
         raise ValueError(f"{name} {value}: expected {least} … {most}{unit}")
+
+
+def check_number(name: str, value: object) -> None:
+    """Check that a value is a number; `name` is what the message calls it.
+
+    Raises:
+        TypeError: it is something else.
+    """
+    if not isinstance(value, Real):
+        raise TypeError(f"{name}: expected a number, got {type(value).__name__}")
+
+
+def listed(name: str, given: Any, kinds: type | tuple[type, ...], what: str) -> tuple:
+    """Objects of some kinds as a tuple; one alone needs no list.
+
+    Raises:
+        TypeError: something else; the message has `name` and `what` was expected.
+    """
+    if isinstance(given, kinds):
+        return (given,)
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
+    for one in found:
+        if not isinstance(one, kinds):
+            got = f"the class {one.__name__}" if isinstance(one, type) else type(one).__name__
+            raise TypeError(f"{name}: expected {what}, got {got}")
+    return found

@@ -12,6 +12,9 @@ import numpy as np
 from wfluid.domain.envelopes import Slopes
 from wfluid.domain.piecewise import finite, hats, interval
 
+FARTHEST = 10.0
+"""Coordinate beyond which a place looks like pixels [longer side]: a picture ends at 1."""
+
 Place = tuple[float, float]
 """x and y [longer side]."""
 
@@ -32,7 +35,7 @@ class Path:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", tuple(float(t) for t in self.times))
-        object.__setattr__(self, "places", tuple(place("Path.places", at) for at in self.places))
+        object.__setattr__(self, "places", tuple(position("Path.places", at) for at in self.places))
         if len(self.times) != len(self.places) or len(self.times) < 2:
             raise ValueError(
                 f"Path: {len(self.times)} times and {len(self.places)} places: need equal, 2 or more"
@@ -73,9 +76,10 @@ def as_center(name: str, center: Center) -> Center:
     """A checked center; `name` is what messages call it.
 
     Raises:
-        ValueError: a fixed place that is not two finite numbers.
+        TypeError: a center that is no place.
+        ValueError: a fixed place that is not two finite numbers, or that looks like pixels.
     """
-    return center if isinstance(center, Path) or callable(center) else place(name, center)
+    return center if isinstance(center, Path) or callable(center) else position(name, center)
 
 
 def place_at(center: Center, t: float) -> Place:
@@ -86,7 +90,7 @@ def place_at(center: Center, t: float) -> Place:
     """
     if isinstance(center, Path):
         return center.at(t)
-    return place(f"the center at {t:g} s", center(t)) if callable(center) else center
+    return position(f"the center at {t:g} s", center(t)) if callable(center) else center
 
 
 def center_slopes(center: Center, t: float, bar: Place) -> Slopes:
@@ -104,11 +108,42 @@ def place(name: str, values: Sequence[float]) -> Place:
     """Two finite numbers as floats; `name` is what messages call them.
 
     Raises:
+        TypeError: something other than numbers.
         ValueError: another count, or a number that is not finite.
     """
-    values = tuple(float(value) for value in values)
+    try:
+        values = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected two numbers x, y, got {values!r}") from None
     if len(values) != 2:
         raise ValueError(f"{name}: expected two numbers, got {len(values)}")
     for value in values:
         finite(name, value)
     return values
+
+
+def position(name: str, values: Sequence[float]) -> Place:
+    """A place [longer side]; `name` is what messages call it.
+
+    Raises:
+        TypeError: something other than numbers.
+        ValueError: another count, a number that is not finite, or numbers that look like pixels.
+    """
+    at = place(name, values)
+    check_no_pixels(name, at)
+    return at
+
+
+def check_no_pixels(name: str, at: Place) -> None:
+    """Check that a place [longer side] does not look like pixels.
+
+    Raises:
+        ValueError: it does; the message has the conversion.
+    """
+    x, y = at
+    if max(abs(x), abs(y)) > FARTHEST:
+        raise ValueError(f"{name} ({x:g}, {y:g}) looks like pixels: {CONVERSION}")
+
+
+CONVERSION = "write (x / side, y / side), with side the longer side of the picture in pixels"
+"""From pixels to the unit of places."""

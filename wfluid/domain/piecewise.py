@@ -9,6 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from wfluid.domain.checks import check_number
+
 Number = TypeVar("Number", float, np.ndarray)
 
 
@@ -59,7 +61,9 @@ def finite(name: str, value: float) -> None:
     """Check that a number is finite; `name` is what the message calls it.
 
     Raises:
+        TypeError: it is no number.
         ValueError: it is infinite or NaN.
     """
+    check_number(name, value)
     if not math.isfinite(value):
         raise ValueError(f"{name} is {value}: expected a finite number")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from wfluid.domain.checks import check_number
 from wfluid.domain.limits import FPS, FPS_LIMIT, LEAST_FPS, STEPS_PER_SECOND
 
 FRAME_LIMIT = 100_000
@@ -48,6 +49,7 @@ class Timeline:
     """Frames at times n / fps for n = 0 … round(duration fps), with `substeps` solver steps between two.
 
     Raises:
+        TypeError: a duration or rate that is no number.
         ValueError: a duration or rate that is not positive and finite, a rate outside 0.01 … 1000, more than
             100 000 frames, substeps that are no integer from 1 on, or steps longer than 10 s.
     """
@@ -62,6 +64,7 @@ class Timeline:
     def __post_init__(self) -> None:
         for name in ("duration", "fps"):
             value = getattr(self, name)
+            check_number(name, value)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} {value}: expected a positive number")
         if self.substeps is not None and not (isinstance(self.substeps, int) and self.substeps >= 1):

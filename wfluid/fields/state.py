@@ -45,6 +45,10 @@ class State:
     p_y: wp.array
     """Positions of points of the picture along y [cells from the top edge], one entry per point."""
 
+    def __repr__(self) -> str:
+        nx, ny = self.grid.nx, self.grid.ny
+        return f"State({nx} x {ny} cells, {len(self.rho)} densities, {len(self.p_x)} points)"
+
     @classmethod
     def at_rest(cls, grid: Grid, device: wp.Device, densities: int = 0, points: int = 0) -> State:
         """A fluid at rest: velocity, displacement, pressure and densities are 0, all points at the origin."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import Protocol
 
-from wfluid.domain.limits import FIRST_FRAME
+import numpy as np
+
+from wfluid.domain.limits import FIRST_FRAME, FPS
 from wfluid.files import movie
 from wfluid.files.gif import GifWriter
 from wfluid.files.movie import MovieWriter
@@ -15,7 +18,7 @@ from wfluid.files.names import check_folder, numbering
 from wfluid.files.stills import StillsWriter
 from wfluid.pictures.fitting import display_notes, fit
 from wfluid.pictures.formats import Encoding, PictureError
-from wfluid.pictures.picture import Picture
+from wfluid.pictures.picture import Picture, PictureLike, picture_of
 
 
 class FrameWriter(Protocol):
@@ -63,7 +66,9 @@ def open_output(
         return GifWriter(path, fps, encoding.background)
     if ending in movie.CODECS:
         if not movie.available():
-            raise PictureError(f"{path}: movies need PyAV; install it with: pip install 'wfluid[video]'")
+            raise PictureError(
+                f"{path}: movies need PyAV; install it in the clone of wfluid: pip install -e '.[video]'"
+            )
         return MovieWriter(path, fps, encoding.background)
     kinds = f"x.gif, {', '.join(f'x{known}' for known in movie.CODECS)}, or a sequence such as x.####.png"
     raise PictureError(f"{path}: cannot tell the output's kind; name it {kinds}")
@@ -95,23 +100,47 @@ class HasPicture(Protocol):
 
 def write_animation(
     path: str | os.PathLike,
-    frames: Iterable[HasPicture],
-    fps: float = 24.0,
+    frames: Iterable[HasPicture | PictureLike],
+    fps: float | None = None,
     start: int = FIRST_FRAME,
     encoding: Encoding | None = None,
 ) -> list[Path]:
     """Write frames one by one as they are computed; returns the files written.
 
+    Frames are those of an animation or a morph, or anything that `Picture.of` takes. `fps` is the frame rate
+    [1/s]; by default that of the frames, which have times, and 24 for pictures, which have none.
+
     Raises:
+        TypeError: frames that are no pictures.
         PictureError: see `open_output`; nothing unfinished is left behind.
         WriteError: a file cannot be written to its end, as on a full disk.
     """
+    one = isinstance(frames, str | os.PathLike | Picture) or (
+        isinstance(frames, np.ndarray) and frames.ndim < 4
+    )
+    if one or not isinstance(frames, Iterable):
+        got = "one picture" if one else type(frames).__name__
+        raise TypeError(f"frames: expected a list of frames or pictures, got {got}")
+    if fps is None and hasattr(frames, "fps"):
+        fps = frames.fps
+    elif fps is None:
+        frames = iter(frames)
+        first = list(islice(frames, 2))
+        fps, frames = _rate_of(first), chain(first, frames)
     output = open_output(path, fps, start, encoding)
     try:
         for frame in frames:
-            output.write(frame.picture)
+            output.write(picture_of("frames", getattr(frame, "picture", frame)))
         output.close()
     except BaseException:
         output.abandon()
         raise
     return output.written
+
+
+def _rate_of(first: Sequence[object]) -> float:
+    """The frame rate of the first two frames [1/s]."""
+    times = [frame.time for frame in first if hasattr(frame, "time")]
+    if len(times) < 2 or times[0] == times[1]:
+        return FPS
+    return round(1 / abs(times[1] - times[0]), 6)

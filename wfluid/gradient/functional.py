@@ -98,7 +98,7 @@ class Functional:
         self,
         grid: Grid,
         fluid: Fluid,
-        forces: Sequence[Force | Group],
+        forces: Force | Group | Sequence[Force | Group],
         timeline: Timeline,
         objective: Objective,
         free: Sequence[Free],

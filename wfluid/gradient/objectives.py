@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from wfluid.domain.paths import Place
+from wfluid.domain.paths import Place, check_no_pixels
+from wfluid.domain.showing import short_repr
 
 
 class Objective:
@@ -112,6 +113,8 @@ class ParticleMisfit(ParticleObjective):
     weights: np.ndarray | float = 1.0
     """Weight of each particle, (n,)."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         for name in ("points", "destinations"):
             object.__setattr__(self, name, places_of(name, getattr(self, name)))
@@ -153,6 +156,8 @@ class ParticleFunction(ParticleObjective):
     times: Sequence[float]
     """Times at which it is evaluated [s]."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", places_of("points", self.points))
         object.__setattr__(self, "times", tuple(float(t) for t in self.times))
@@ -181,12 +186,14 @@ def places_of(name: str, values: Any) -> np.ndarray:
     """Positions as an array (n, 2).
 
     Raises:
-        ValueError: another shape, or a number that is not finite.
+        ValueError: another shape, a number that is not finite, or places that look like pixels.
     """
     values = np.array(values, dtype=np.float64) if np.size(values) else np.empty((0, 2))  # a copy
     if values.ndim != 2 or values.shape[1] != 2:
         raise ValueError(f"{name} of shape {values.shape}: expected (n, 2)")
-    return finite_array(name, values, values.shape)
+    for at in finite_array(name, values, values.shape):
+        check_no_pixels(name, (at[0], at[1]))
+    return values
 
 
 def finite_array(name: str, values: Any, shape: tuple[int, ...]) -> np.ndarray:

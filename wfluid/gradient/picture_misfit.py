@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from wfluid.domain.showing import short_repr
 from wfluid.fields.arrays import field, from_numpy, interior, read, upload, zeros
 from wfluid.fields.state import State
 from wfluid.gradient.state_objectives import DeviceObjective, StateObjective
 from wfluid.kernels.adjoint import misfit
 from wfluid.kernels.cell.layout import Layout
 from wfluid.kernels.view.lookup import Pixel
-from wfluid.model.painted import Painted
-from wfluid.pictures.picture import Picture
+from wfluid.model.painted import Painted, as_weight
+from wfluid.pictures.picture import Picture, picture_of
 from wfluid.pictures.sampling import check_look_up
 from wfluid.step.step import Step
 from wfluid.view.lookup import QUAD, LookUp, quads_of
@@ -36,7 +37,7 @@ class PictureMisfit(StateObjective):
     """
 
     picture: Picture
-    """The picture that is warped, stretched over the fluid."""
+    """The picture that is warped, stretched over the fluid; anything that `Picture.of` takes."""
     target: Picture
     """The target, with the channels of the warped picture: the transparent edge adds an alpha."""
     time: float
@@ -48,6 +49,8 @@ class PictureMisfit(StateObjective):
     weight: Painted | None = None
     """A factor painted over the picture; 1 by default."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         if self.filter not in ADJOINTS:
             raise ValueError(
@@ -55,7 +58,9 @@ class PictureMisfit(StateObjective):
                 f"{', '.join(ADJOINTS)}"
             )
         check_look_up(self.filter, self.edge)
+        object.__setattr__(self, "weight", as_weight("PictureMisfit.weight", self.weight))
         for name in ("picture", "target"):
+            object.__setattr__(self, name, picture_of(f"PictureMisfit.{name}", getattr(self, name)))
             pixels = getattr(self, name).pixels
             if pixels.ndim != 3 or not pixels.size:
                 raise ValueError(

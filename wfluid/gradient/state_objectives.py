@@ -11,6 +11,7 @@ import numpy as np
 import warp as wp
 
 from wfluid.domain.paths import Place
+from wfluid.domain.showing import short_repr
 from wfluid.fields.arrays import fill, from_numpy, read, vector, zeros
 from wfluid.fields.state import State
 from wfluid.fields.sums import InnerProduct
@@ -73,6 +74,8 @@ class MapMisfit(StateObjective):
     weight: Painted | None = None
     """A factor painted over the picture; 1 by default."""
 
+    __repr__ = short_repr
+
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
         """The objective on the device, where displacements are in cells."""
         grid = step.grid
@@ -99,6 +102,8 @@ class DensityMisfit(StateObjective):
     """Time at which it is evaluated [s]."""
     weight: Painted | None = None
     """A factor painted over the picture; 1 by default."""
+
+    __repr__ = short_repr
 
     def term(self, step: Step, weight: float, particles: slice) -> DeviceObjective:
         """The objective on the device."""

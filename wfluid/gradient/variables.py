@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from wfluid.domain.grid import Grid
+from wfluid.domain.showing import short_repr
 from wfluid.model.densities import PaintedSource
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import FieldForce, Force, GaussianImpulse
@@ -40,6 +41,8 @@ class Setup:
     velocity: np.ndarray
     """Velocity at the beginning [longer side/s], (2, ny, nx): u on the first nx x-faces, v on the first
     ny y-faces. Values on walls are ignored: there it is 0."""
+
+    __repr__ = short_repr
 
     def number(self, name: str) -> object:
         """The number or numbers with a name such as "forces[0].vector"."""

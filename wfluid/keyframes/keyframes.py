@@ -9,7 +9,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from wfluid.domain.paths import Place
+from wfluid.domain.checks import check_number
+from wfluid.domain.paths import CONVERSION, Place, check_no_pixels
 
 COINCIDENT = 1e-6
 """Places closer than this are the same [longer side]."""
@@ -20,7 +21,9 @@ class ParticleKeyframe:
     """The destination of a point of the picture at a time; several of one point make a path.
 
     Raises:
-        ValueError: numbers that are not finite, a time that is not positive, a weight that is not positive.
+        TypeError: a place, time or weight that is no number.
+        ValueError: numbers that are not finite, places that look like pixels, a time or a weight that is not
+            positive.
     """
 
     point: Place
@@ -34,14 +37,28 @@ class ParticleKeyframe:
 
     def __post_init__(self) -> None:
         for name in ("point", "destination"):
-            place = tuple(float(value) for value in getattr(self, name))
+            place = _two_numbers(f"ParticleKeyframe.{name}", getattr(self, name))
             if len(place) != 2 or not all(map(math.isfinite, place)):
                 raise ValueError(f"ParticleKeyframe.{name} {place}: expected two finite numbers")
+            check_no_pixels(f"ParticleKeyframe.{name}", place)
             object.__setattr__(self, name, place)
         for name in ("time", "weight"):
             value = getattr(self, name)
+            check_number(f"ParticleKeyframe.{name}", value)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"ParticleKeyframe.{name} {value}: expected a positive number")
+
+
+def _two_numbers(name: str, given: object) -> Place:
+    """A place, whose numbers may be wrong.
+
+    Raises:
+        TypeError: something other than numbers.
+    """
+    try:
+        return tuple(float(value) for value in given)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected two numbers x, y, got {given!r}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +105,7 @@ def targets_of(
     """
     if not keyframes:
         raise ValueError("no keyframes: say where at least one point should be")
-    pins = [tuple(float(value) for value in pin) for pin in pins]
+    pins = [_two_numbers("a pin", pin) for pin in pins]
     moved: dict[Place, list[ParticleKeyframe]] = {}
     for keyframe in keyframes:
         for what, place in (("point", keyframe.point), ("destination", keyframe.destination)):
@@ -111,7 +128,8 @@ def targets_of(
 def _check_inside(what: str, place: Place, extent: tuple[float, float], side: float) -> None:
     if not all(0 <= value <= size for value, size in zip(place, extent, strict=True)):
         shown = f"{extent[0] * side:g} x {extent[1] * side:g}"
-        raise ValueError(f"{what} {_shown(place, side)} lies outside the picture, {shown}")
+        unit = f" longer sides: {CONVERSION}" if side == 1 else ""
+        raise ValueError(f"{what} {_shown(place, side)} lies outside the picture, {shown}{unit}")
 
 
 def _known(place: Place, moved: dict[Place, list[ParticleKeyframe]]) -> Place:

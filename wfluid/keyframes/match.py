@@ -1,13 +1,13 @@
 """The search for forces that take points of a picture to their keyframes, and its result.
 
->>> from wfluid import Fluid, read_picture, write_animation
->>> picture = read_picture("examples/images/cat.png")
+>>> from wfluid import Fluid, write_animation
+>>> picture = "examples/images/cat.png"
 >>> timeline = Timeline(0.5, fps=12, substeps=4)
 >>> animation = Animation(picture, Fluid(viscosity=0.005), [], timeline, cells=32, width=48)
 >>> match = match_keyframes(animation, [ParticleKeyframe((0.4, 0.5), (0.45, 0.45), time=0.5)])
 >>> match.status
 'reached'
->>> write_animation("nose.gif", match.animation.frames(), fps=12)
+>>> write_animation("nose.gif", match.animation.frames())
 [PosixPath('nose.gif')]
 
 This is the third technique of Bonilla & Velho, section III: u contains the vectors and centers of Gaussian
@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wfluid.animation.animation import Animation
+from wfluid.domain.checks import listed
 from wfluid.domain.limits import TOLERANCE
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import Timeline
@@ -73,6 +74,10 @@ class Match:
     seconds: dict[str, float]
     """Time spent [s]: simulation, adjoint, optimiser (with all other host code), total."""
 
+    def __repr__(self) -> str:
+        side = max(self.animation.picture.width, self.animation.picture.height)
+        return f"Match({self.status}, {self.residual * side:.2g} px away, {len(self.found)} forces)"
+
     @property
     def residual(self) -> float:
         """The largest residual [longer side]."""
@@ -86,7 +91,7 @@ class Match:
 
 def match_keyframes(
     animation: Animation,
-    keyframes: Sequence[ParticleKeyframe],
+    keyframes: ParticleKeyframe | Sequence[ParticleKeyframe],
     *,
     pins: Sequence[Place] = (),
     free: Sequence[Free] = (),
@@ -125,6 +130,7 @@ def match_keyframes(
         raise ValueError(f"tolerance {tolerance}: expected a positive number")
     animation = replace(animation, fluid=_solved_surely(animation.fluid))
     grid, timeline = animation.grid, animation.timeline
+    keyframes = listed("keyframes", keyframes, ParticleKeyframe, "ParticleKeyframe objects")
     keyframes = [replace(keyframe, time=_snapped(keyframe.time, timeline)) for keyframe in keyframes]
     particles = targets_of(keyframes, pins, (grid.width, grid.height), timeline.end, side)
     for t in sorted({t for particle in particles for t in particle.times}):

@@ -84,7 +84,7 @@ def check_plot(path: str | os.PathLike) -> Path:
         import matplotlib  # noqa: F401
     except ImportError:
         raise ValueError(
-            f"{path}: plots need matplotlib; install it with: pip install 'wfluid[plot]'"
+            f"{path}: plots need matplotlib; install it in the clone of wfluid: pip install -e '.[plot]'"
         ) from None
     return path
 

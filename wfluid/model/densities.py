@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from wfluid.domain.checks import check_word
+from wfluid.domain.checks import check_word, listed
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, scaled
 from wfluid.domain.limits import INK, LOOKS, VISCOSITY_LIMIT
 from wfluid.domain.paths import Center, as_center, place_at
 from wfluid.domain.piecewise import finite
+from wfluid.domain.showing import short_repr
 from wfluid.model.force import GaussianImpulse, check_radius, impulse_slopes, shape_slopes
-from wfluid.model.painted import Painted
+from wfluid.model.painted import Painted, as_painted
 
 SOURCE_RATE_LIMIT = 1e6
 """Largest rate of a source [1/s]."""
@@ -64,6 +65,11 @@ class PaintedSource:
     envelope: Envelope = field(default_factory=Constant)
     """Factor over time."""
 
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "paint", as_painted("PaintedSource.paint", self.paint))
+
     def pull_back(self, start: float, end: float, bar: float) -> Slopes:
         """The gradient with respect to the envelope, from `bar`, that with respect to its integral."""
         return scaled(self.envelope.slopes(start, end), bar, "envelope.")
@@ -84,11 +90,13 @@ class Density:
     initial: Painted | None = None
     """Density at time 0; 0 by default."""
     sources: Sequence[Source | PaintedSource] = ()
-    """Sources S."""
+    """Sources S; one needs no list."""
     color: tuple[float, float, float] = INK
     """Colour: red, green, blue, 0 … 1 in linear light."""
     look: str = "ink"
     """"ink" multiplies the picture by color^rho; "smoke" covers it with opacity 1 - exp(-rho)."""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -98,4 +106,7 @@ class Density:
         check_word("look", self.look, LOOKS)
         if len(self.color) != 3 or not all(0 <= value <= 1 for value in self.color):
             raise ValueError(f"color {self.color}: expected three numbers 0 … 1")
-        object.__setattr__(self, "sources", tuple(self.sources))
+        if self.initial is not None:
+            object.__setattr__(self, "initial", as_painted("Density.initial", self.initial))
+        kinds, what = (Source, PaintedSource), "Source or PaintedSource objects"
+        object.__setattr__(self, "sources", listed("Density.sources", self.sources, kinds, what))

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wfluid.domain.checks import check_word
+from wfluid.domain.checks import check_word, listed
 from wfluid.domain.limits import CYCLES, DIFFUSION_LOSS, DIFFUSION_TOLERANCE, SCHEMES, SOLVERS, VISCOSITY
+from wfluid.domain.showing import short_repr
 from wfluid.domain.walls import Wall, Walls
 from wfluid.model.densities import Density
 from wfluid.model.painted import Freeze, Keyed, Painted, Quantity, as_quantity, check_painted
@@ -36,7 +37,7 @@ class Fluid:
     forces at once, as the Stokes flow that dissipates least, and only ratios of viscosities matter to how it
     deforms the picture."""
     densities: Sequence[Density] = ()
-    """Densities such as ink and smoke, with different names."""
+    """Densities such as ink and smoke, with different names; one needs no list."""
     walls: Walls | str = field(default_factory=Walls)
     """Boundary conditions at the edges: `Walls`, or "free-slip", "no-slip", "periodic", or one for each axis
     as "x,y"."""
@@ -62,6 +63,8 @@ class Fluid:
     sweeps: int = 50
     """Jacobi sweeps per solve with solver="jacobi"."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "walls", Walls.parse(self.walls))
         object.__setattr__(self, "viscosity", as_quantity("viscosity", self.viscosity))
@@ -71,9 +74,7 @@ class Fluid:
                 check_painted(painted.values)
         if self.freeze is not None and not isinstance(self.freeze, Freeze):
             raise TypeError(f"freeze: expected Freeze(mask), got {type(self.freeze).__name__}")
-        object.__setattr__(self, "densities", tuple(self.densities))
-        if not all(isinstance(density, Density) for density in self.densities):
-            raise TypeError("densities: expected Density objects")
+        object.__setattr__(self, "densities", listed("densities", self.densities, Density, "Density objects"))
         if len(set(self.density_names)) < len(self.densities):
             raise ValueError(
                 f"densities {', '.join(self.density_names)}: two have one name; give each its own"

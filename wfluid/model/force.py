@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from wfluid.domain.checks import check_number, listed
 from wfluid.domain.envelopes import Constant, Envelope, Slopes, product, scaled
 from wfluid.domain.grid import Grid
 from wfluid.domain.operators import mean_with_before
 from wfluid.domain.paths import Center, Place, center_slopes
 from wfluid.domain.piecewise import finite
+from wfluid.domain.showing import short_repr
 from wfluid.domain.walls import Walls
-from wfluid.model.painted import Painted
+from wfluid.model.painted import Painted, as_painted
 
 FORCE_LIMIT = 1e4
 """Largest acceleration that the solver is tested with [longer side/s^2]."""
@@ -59,6 +61,21 @@ class Force(ABC):
     """Factor over time."""
     weight: Painted | None = None
     """Factor over the picture; 1 everywhere by default."""
+
+    def _settle(self) -> None:
+        """Check the envelope, and turn a picture given as weight into `Painted`.
+
+        Raises:
+            TypeError: an envelope or a weight of another type.
+        """
+        name = type(self).__name__
+        if not isinstance(self.envelope, Envelope):
+            raise TypeError(
+                f"{name}.envelope: expected an envelope, such as Constant(0, 1) or Oscillator(period=1), "
+                f"got {type(self.envelope).__name__}"
+            )
+        if self.weight is not None:
+            object.__setattr__(self, "weight", as_painted(f"{name}.weight", self.weight))
 
     def under(self, envelope: Envelope) -> Force:
         """The same force, its envelope multiplied by another one."""
@@ -124,7 +141,7 @@ class Group:
         ValueError: a strength that is not finite.
     """
 
-    members: Sequence[Force | Group]
+    members: Force | Group | Sequence[Force | Group]
     """The forces; a group may contain groups."""
     envelope: Envelope = field(default_factory=Constant)
     """Common factor over time."""
@@ -135,22 +152,28 @@ class Group:
     forces: tuple[Force, ...] = field(init=False, repr=False)
     """The forces, each with the common envelope and strength applied."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         finite("Group.strength", self.strength)
         common = product(self.strength, self.envelope)
         object.__setattr__(self, "forces", tuple(force.under(common) for force in flatten(self.members)))
 
 
-def flatten(forces: Sequence[Force | Group]) -> tuple[Force, ...]:
+FORCES = "forces, such as GaussianForce((0.5, 0.5), (1, 0), 0.06), or a Group of them"
+"""What a list of forces holds."""
+
+
+def flatten(forces: Force | Group | Iterable[Force | Group]) -> tuple[Force, ...]:
     """All forces in order, with each group replaced by its forces.
+
+    One force, or one group, needs no list.
 
     Raises:
         TypeError: an entry that is neither a force nor a group.
     """
     found: list[Force] = []
-    for force in forces:
-        if not isinstance(force, Force | Group):
-            raise TypeError(f"expected a force or a Group of forces, got {type(force).__name__}")
+    for force in listed("forces", forces, (Force, Group), FORCES):
         found += force.forces if isinstance(force, Group) else (force,)
     return tuple(found)
 
@@ -206,7 +229,9 @@ def check_radius(name: str, value: float) -> None:
     """Check a radius [longer side].
 
     Raises:
+        TypeError: it is no number.
         ValueError: it is outside 1e-6 … 1e3; the message states the range.
     """
+    check_number(name, value)
     if not LEAST_RADIUS <= value <= MOST_RADIUS:
         raise ValueError(f"{name} {value}: expected {LEAST_RADIUS:g} … {MOST_RADIUS:g} longer sides")

@@ -51,6 +51,7 @@ class GaussianForce(LocalForce):
     """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
+        self._settle()
         object.__setattr__(self, "center", as_center("GaussianForce.center", self.center))
         object.__setattr__(self, "vector", place("GaussianForce.vector", self.vector))
         check_acceleration("force", math.hypot(*self.vector))
@@ -92,6 +93,7 @@ class VortexForce(LocalForce):
     """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
+        self._settle()
         object.__setattr__(self, "center", as_center("VortexForce.center", self.center))
         check_radius("VortexForce.radius", self.radius)
         finite("VortexForce.spin", self.spin)
@@ -139,6 +141,7 @@ class Growth(LocalForce):
     """Factor over the picture, 1 everywhere by default; the mean of the product is subtracted."""
 
     def __post_init__(self) -> None:
+        self._settle()
         object.__setattr__(self, "center", as_center("Growth.center", self.center))
         check_radius("Growth.radius", self.radius)
         if not abs(self.rate) <= GROWTH_RATE_LIMIT:

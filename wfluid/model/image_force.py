@@ -12,10 +12,11 @@ from wfluid.domain.envelopes import Constant, Envelope
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import IMAGE_BLUR, IMAGE_FORCES
 from wfluid.domain.operators import before, blurred, mean_with_before
+from wfluid.domain.showing import short_repr
 from wfluid.domain.walls import Walls
 from wfluid.model.force import FORCE_LIMIT, FieldForce, on_faces
-from wfluid.model.painted import Painted
-from wfluid.pictures.picture import Picture, as_stored, resample
+from wfluid.model.painted import Painted, values_of
+from wfluid.pictures.picture import PictureLike, as_stored, picture_of, resample
 
 _FLAT = 1e-5
 """Range of intensities below which the gradient is rounding."""
@@ -38,8 +39,9 @@ class ImageForce(FieldForce):
             constant picture, or "vectors" of a picture with one channel.
     """
 
-    picture: Picture | np.ndarray
-    """A picture; or an array (height, width) of intensities, (height, width, 2) of vectors."""
+    picture: PictureLike
+    """A picture, as anything that `Picture.of` takes; or an array (height, width) of intensities, of floats
+    (height, width, 2) of vectors."""
     kind: str = "gradient"
     """"gradient", "contour" or "vectors"."""
     strength: float = 1.0
@@ -54,14 +56,18 @@ class ImageForce(FieldForce):
     _values: np.ndarray = field(init=False, repr=False)
     """Intensities (height, width), or vectors (height, width, 2)."""
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
+        self._settle()
         check_word("ImageForce: kind", self.kind, IMAGE_FORCES)
         if not abs(self.strength) <= FORCE_LIMIT:
             raise ValueError(f"ImageForce: strength {self.strength}: expected at most {FORCE_LIMIT:g}")
         if not (math.isfinite(self.radius) and self.radius >= 0):
             raise ValueError(f"ImageForce: radius {self.radius}: expected 0 or more")
         if self.kind != "vectors":
-            values = Painted(self.picture).values
+            values = values_of("ImageForce.picture", self.picture)
+            values = Painted(values).values
             if np.ptp(values) == 0:
                 raise ValueError("ImageForce: the picture is the same everywhere, so it has no slopes")
         else:
@@ -96,7 +102,7 @@ class ImageForce(FieldForce):
         return [on_faces([self.strength * f for f in force], self.weight, grid, walls)]
 
 
-def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
+def vectors_of(picture: PictureLike) -> np.ndarray:
     """Vectors (height, width, 2) from a picture or an array.
 
     Arrays and float files are used unchanged. In integer files code 128 of 8 bits, or 32768 of 16 bits, is 0,
@@ -105,7 +111,8 @@ def vectors_of(picture: Picture | np.ndarray) -> np.ndarray:
     Raises:
         ValueError: fewer than two channels, or values that are not finite.
     """
-    if isinstance(picture, Picture):
+    if not isinstance(picture, np.ndarray) or picture.dtype.kind == "u":
+        picture = picture_of("ImageForce.picture", picture)
         values, alpha = as_stored(picture), picture.alpha
         channels = picture.color_channels[:2]
         if len(channels) < 2:

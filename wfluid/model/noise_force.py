@@ -56,6 +56,7 @@ class NoiseForce(FieldForce):
     """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
+        self._settle()
         finite("NoiseForce.strength", self.strength)
         if not abs(self.strength) <= FORCE_LIMIT / _PEAK:
             raise ValueError(

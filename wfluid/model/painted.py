@@ -8,6 +8,7 @@ of any size cover the picture and are averaged onto the cells of the grid.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -17,7 +18,8 @@ import numpy as np
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import DRAG, DRAG_LIMIT, VISCOSITY_LIMIT
 from wfluid.domain.piecewise import interval
-from wfluid.pictures.picture import Picture, intensity, resample
+from wfluid.domain.showing import short_repr
+from wfluid.pictures.picture import Picture, PictureLike, intensity, picture_of, resample
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +31,9 @@ class Painted:
             `invert` with values above 1, or a floor above the scale.
     """
 
-    picture: Picture | np.ndarray
-    """A picture, of which the intensity 0 … 1 is used, or an array (height, width) of values from 0 on."""
+    picture: PictureLike
+    """A picture, of which the intensity 0 … 1 is used, as anything that `Picture.of` takes; or an array
+    (height, width) of values from 0 on. Arrays of uint8 or uint16, or with channels, are pictures."""
     scale: float = 1.0
     """Value of intensity 1."""
     invert: bool = False
@@ -41,10 +44,7 @@ class Painted:
     """The painted values, (height, width) of the painting."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.picture, Picture):
-            values = intensity(self.picture)
-        else:
-            values = np.asarray(self.picture, dtype=np.float64)
+        values = values_of("Painted.picture", self.picture)
         if values.ndim != 2 or not values.size:
             raise ValueError(f"painted values of shape {values.shape}: expected (height, width)")
         _finite_from_zero("painted values", values)
@@ -56,6 +56,10 @@ class Painted:
         object.__setattr__(self, "values", self.floor + (self.scale - self.floor) * shown)
         if self.floor > self.scale:
             raise ValueError(f"floor {self.floor:g} is above scale {self.scale:g}")
+
+    def __repr__(self) -> str:
+        height, width = self.values.shape
+        return f"Painted({width} x {height}, {self.values.min():.3g} … {self.values.max():.3g})"
 
     def sample(self, grid: Grid) -> np.ndarray:
         """Means over the cells of a grid, (ny, nx)."""
@@ -80,6 +84,8 @@ class Keyed:
 
     keys: Mapping[float, float | np.ndarray | Painted]
     """Values by time [s]."""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not self.keys or not all(math.isfinite(t) for t in self.keys):
@@ -111,8 +117,8 @@ class Freeze:
             picture.
     """
 
-    mask: Picture | np.ndarray
-    """Picture or array (height, width): white (1) is held in place, black (0) is free."""
+    mask: PictureLike
+    """Picture or array (height, width), as `Painted` takes: white (1) is held in place, black (0) is free."""
     strength: float = DRAG
     """Drag of white [1/s]."""
     paint: Painted = field(init=False, repr=False)
@@ -121,7 +127,7 @@ class Freeze:
     def __post_init__(self) -> None:
         if not 0 <= self.strength <= DRAG_LIMIT:
             raise ValueError(f"freeze strength {self.strength}: expected 0 … {DRAG_LIMIT:g}")
-        object.__setattr__(self, "paint", Painted(self.mask))
+        object.__setattr__(self, "paint", as_painted("Freeze.mask", self.mask))
         least, most = self.paint.values.min(), self.paint.values.max()
         if most > 1:
             raise ValueError(f"freeze mask with values up to {most:g}: expected 0 … 1")
@@ -130,9 +136,49 @@ class Freeze:
                 "the freeze mask is painted all over, so nothing could move: leave what should move black"
             )
 
+    def __repr__(self) -> str:
+        height, width = self.paint.values.shape
+        return f"Freeze({width} x {height}, strength={self.strength:g})"
+
     def sample(self, grid: Grid) -> np.ndarray:
         """Drag of the cells of a grid [1/s], (ny, nx)."""
         return np.expm1(self.paint.sample(grid) * math.log1p(self.strength))
+
+
+def values_of(name: str, picture: PictureLike) -> np.ndarray:
+    """The intensity of a picture, or the values of an array that is none, (height, width) in float64.
+
+    Raises:
+        TypeError: neither; `name` is what the message calls it.
+        PictureError: a picture without an intensity.
+    """
+    if is_picture(picture):
+        return intensity(picture_of(name, picture))
+    return np.asarray(picture, dtype=np.float64)
+
+
+def is_picture(what: object) -> bool:
+    """Whether something is taken as a picture; the other arrays, of floats or integers, are plain values."""
+    if not isinstance(what, np.ndarray | list | tuple):
+        return True
+    return isinstance(what, np.ndarray) and (what.dtype in (np.uint8, np.uint16) or what.ndim > 2)
+
+
+def as_painted(name: str, what: Painted | PictureLike) -> Painted:
+    """A quantity over the picture: pictures and arrays become `Painted`.
+
+    Raises:
+        TypeError: something else; `name` is what the message calls it.
+        ValueError: as `Painted`.
+    """
+    if isinstance(what, Painted):
+        return what
+    return Painted(picture_of(name, what) if is_picture(what) else what)
+
+
+def as_weight(name: str, weight: Painted | PictureLike | None) -> Painted | None:
+    """As `as_painted`; None, which is 1 everywhere, is kept."""
+    return None if weight is None else as_painted(name, weight)
 
 
 def as_quantity(name: str, what: object) -> Quantity:
@@ -144,9 +190,11 @@ def as_quantity(name: str, what: object) -> Quantity:
     """
     if isinstance(what, Painted | Keyed) or callable(what):
         return what
-    if isinstance(what, np.ndarray) and what.ndim:
+    if isinstance(what, np.ndarray) and what.ndim and what.dtype not in (np.uint8, np.uint16):
+        if what.ndim != 2 or not what.size:
+            raise ValueError(f"{name} of shape {what.shape}: expected (height, width)")
         return Painted(what)
-    if isinstance(what, Picture):
+    if isinstance(what, Picture | os.PathLike) or (isinstance(what, np.ndarray) and what.ndim):
         raise TypeError(f"{name}: a picture needs a scale: Painted(picture, scale=…)")
     if not isinstance(what, int | float | np.number | np.ndarray):
         raise TypeError(f"{name}: expected a number, an array, Painted, Keyed or a function of the time")

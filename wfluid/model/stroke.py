@@ -40,6 +40,7 @@ class Stroke(LocalForce):
     """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
+        self._settle()
         if not isinstance(self.path, Path):
             raise TypeError(f"Stroke.path: expected a Path, got {type(self.path).__name__}")
         check_radius("Stroke.radius", self.radius)

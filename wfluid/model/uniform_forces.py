@@ -35,6 +35,7 @@ class Wind(FieldForce):
     """Factor over the picture; 1 everywhere by default."""
 
     def __post_init__(self) -> None:
+        self._settle()
         object.__setattr__(self, "vector", place("Wind.vector", self.vector))
         check_acceleration("wind", math.hypot(*self.vector))
 
@@ -74,6 +75,7 @@ class Buoyancy(Force):
     """Factor over time."""
 
     def __post_init__(self) -> None:
+        self._settle()
         object.__setattr__(self, "vector", place("Buoyancy.vector", self.vector))
         check_acceleration("buoyancy", math.hypot(*self.vector))
 

@@ -9,7 +9,7 @@ from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.quality import MapQuality
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class MorphFrame(Frame):
     """A frame of a morph: `map` and `quality` are those of the first picture.
 

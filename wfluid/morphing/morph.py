@@ -1,10 +1,10 @@
 """Morphs: one picture flows into another, through points of both (Bonilla & Velho, figure 7).
 
->>> from wfluid import read_picture, write_animation
->>> cat, raccoon = (read_picture(f"examples/images/{name}.png") for name in ("cat", "raccoon_face"))
+>>> from wfluid import write_animation
+>>> cat, raccoon = (f"examples/images/{name}.png" for name in ("cat", "raccoon_face"))
 >>> points = [((0.38, 0.25), (0.34, 0.34)), ((0.7, 0.3), (0.58, 0.39))]
 >>> morph_of_two = morph(cat, raccoon, points, duration=0.5, fps=12, cells=32, width=48)
->>> write_animation("morph.gif", morph_of_two.frames(), fps=12)
+>>> write_animation("morph.gif", morph_of_two.frames())
 [PosixPath('morph.gif')]
 
 Keyframes take the points of the first picture a to those of the second picture b within the time of one flow.
@@ -27,20 +27,20 @@ from wfluid.animation.run import Run, RunTimes
 from wfluid.domain.curves import delayed_part
 from wfluid.domain.limits import DELAY, EASE, MORPH_TOLERANCE, MORPH_VISCOSITY
 from wfluid.domain.operators import blurred
-from wfluid.domain.paths import Place
+from wfluid.domain.paths import Place, check_no_pixels
 from wfluid.domain.timeline import Timeline
 from wfluid.fields.state import State
 from wfluid.keyframes.keyframes import ParticleKeyframe
 from wfluid.keyframes.match import Match, match_keyframes
 from wfluid.keyframes.search import Progress
 from wfluid.model.fluid import Fluid
-from wfluid.model.painted import Painted
+from wfluid.model.painted import Painted, as_weight
 from wfluid.morphing.flow_maps import FlowMaps, flow_maps
 from wfluid.morphing.frame import MorphFrame
 from wfluid.morphing.settings import MorphSettings
 from wfluid.pictures.blend import blended
 from wfluid.pictures.pairing import PicturePair, paired
-from wfluid.pictures.picture import Picture
+from wfluid.pictures.picture import PictureLike, picture_of
 from wfluid.view.coordinate_map import CoordinateMap
 from wfluid.view.quality import MapQuality, measure_map
 
@@ -64,6 +64,9 @@ class Morph:
     """The two pictures; the first is also that of the match's animation."""
     settings: MorphSettings
     """Timing, curves and blending."""
+
+    def __repr__(self) -> str:
+        return f"Morph({self.frame_count} frames, {self.match})"
 
     @property
     def animation(self) -> Animation:
@@ -145,7 +148,7 @@ class Morph:
     def frames(self) -> Run[MorphFrame]:
         """The frames in the order of the settings; the first and the last equal the two pictures."""
         seconds = RunTimes()
-        return Run(self._frames(seconds), self.frame_count, seconds)
+        return Run(self._frames(seconds), self.frame_count, self.settings.timeline.fps, seconds)
 
     def _frames(self, seconds: RunTimes) -> Iterator[MorphFrame]:
         animation, settings, clock = self.animation, self.settings, time.perf_counter
@@ -199,8 +202,8 @@ class Morph:
 
 
 def morph(
-    a: Picture,
-    b: Picture,
+    a: PictureLike,
+    b: PictureLike,
     points: Sequence[tuple[Place, Place]] | np.ndarray,
     duration: float = 2.0,
     fps: float = 24.0,
@@ -211,7 +214,7 @@ def morph(
     warp_curve: str | Mapping[float, float] = EASE,
     blend_curve: str | Mapping[float, float] = EASE,
     blend: str = "linear",
-    mask: Painted | None = None,
+    mask: Painted | PictureLike | None = None,
     delay: float = DELAY,
     reverse: bool = False,
     pingpong: bool = False,
@@ -222,14 +225,14 @@ def morph(
 ) -> Morph:
     """A morph of picture a into picture b. The search for its flow takes minutes on a large grid.
 
+    `a` and `b` are anything that `Picture.of` takes, such as paths.
+
     - `points`: corresponding points, (n, 2, 2) or (n, 4): x, y in a [longer side of a], x, y in b [longer
-    side
-      of b].
+      side of b].
     - `pins`: points of a that stay in place [longer side of a].
     - `fit`: fit of b to the frame of a: "fill" (cropped), "fit" (with bars) or "stretch".
     - `settings`: those of `Animation`: cells, width, height, filter, edge, device. Frames have the size of a
-    by
-      default.
+      by default.
 
     `MorphSettings` and `match_keyframes` document the other arguments.
 
@@ -237,6 +240,8 @@ def morph(
         ValueError: no points, or points that are not pairs of two numbers; points outside a, or outside the
             visible part of b; arguments that `MorphSettings`, `paired` or `match_keyframes` refuse.
     """
+    a, b = picture_of("a", a), picture_of("b", b)
+    mask = as_weight("mask", mask)
     shape = MorphSettings(
         Timeline(duration, fps), warp_curve, blend_curve, blend, mask, delay, reverse, pingpong
     )
@@ -258,7 +263,7 @@ def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:
     """Corresponding points as pairs of places.
 
     Raises:
-        ValueError: an array that is not (n, 2, 2) or (n, 4).
+        ValueError: an array that is not (n, 2, 2) or (n, 4), or numbers that look like pixels.
     """
     try:
         rows = np.asarray(points, dtype=np.float64).reshape(max(1, len(points)), -1)
@@ -268,4 +273,7 @@ def _pairs(points: Sequence | np.ndarray) -> list[tuple[Place, Place]]:
         ) from error
     if not len(rows) or rows.shape[1] != 4:
         raise ValueError("points: expected x, y in the one picture and x, y in the other, for at least one")
+    for x, y, to_x, to_y in rows.tolist():
+        check_no_pixels("a point of the first picture", (x, y))
+        check_no_pixels("a point of the second picture", (to_x, to_y))
     return [((x, y), (to_x, to_y)) for x, y, to_x, to_y in rows.tolist()]

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from wfluid.domain.curves import Curve, curve_of
 from wfluid.domain.limits import DELAY, DELAY_LIMIT, EASE
 from wfluid.domain.timeline import Timeline
-from wfluid.model.painted import Painted
+from wfluid.model.painted import Painted, as_weight
 from wfluid.pictures.blend import check_light
 
 
@@ -31,8 +29,8 @@ class MorphSettings:
     """Weight of the second picture in the blend, given in the same way."""
     blend: str = "linear"
     """Space to blend in: "linear" light or "display" values."""
-    mask: Painted | np.ndarray | None = None
-    """Timing mask, 1 (white) where the morph happens first."""
+    mask: Painted | None = None
+    """Timing mask, or a picture or an array of it, 1 (white) where the morph happens first."""
     delay: float = DELAY
     """Delay where the mask is black, a fraction of the duration."""
     reverse: bool = False
@@ -44,8 +42,7 @@ class MorphSettings:
         for name in ("warp_curve", "blend_curve"):
             object.__setattr__(self, name, curve_of(getattr(self, name), self.timeline.duration))
         check_light(self.blend)
-        if isinstance(self.mask, np.ndarray):
-            object.__setattr__(self, "mask", Painted(self.mask))
+        object.__setattr__(self, "mask", as_weight("timing mask", self.mask))
         if not 0 <= self.delay <= DELAY_LIMIT:
             raise ValueError(f"delay {self.delay}: expected a part of the time, 0 … {DELAY_LIMIT}")
         if self.mask is not None and self.mask.values.max() > 1:

@@ -9,7 +9,8 @@ import numpy as np
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of red, green and blue (Rec. 709)."""
 
-_CODES = {"uint8": 255, "uint16": 65535}
+CODES = {"uint8": 255, "uint16": 65535}
+"""Largest code of an integer type."""
 _LADDER = 1 << 16
 
 
@@ -29,7 +30,7 @@ def to_srgb(linear: np.ndarray) -> np.ndarray:
 
 def decode(stored: np.ndarray, srgb: bool) -> np.ndarray:
     """Stored numbers of any type as float32, integers scaled to 0 … 1, in linear light."""
-    top = _CODES.get(stored.dtype.name)
+    top = CODES.get(stored.dtype.name)
     if top is None:
         values = stored.astype(np.float32)
         return to_linear(values) if srgb else values
@@ -38,7 +39,7 @@ def decode(stored: np.ndarray, srgb: bool) -> np.ndarray:
 
 def encode(linear: np.ndarray, dtype: str, srgb: bool) -> np.ndarray:
     """Linear light as numbers of `dtype`, rounded to the nearest one within the range of the type."""
-    top = _CODES.get(dtype)
+    top = CODES.get(dtype)
     if top is None:
         limit = np.finfo(dtype).max
         values = to_srgb(linear) if srgb else linear
@@ -50,9 +51,14 @@ def encode(linear: np.ndarray, dtype: str, srgb: bool) -> np.ndarray:
     return np.rint((to_srgb(values) if srgb else values) * np.float64(top)).astype(dtype)
 
 
+def channels_beside(alpha: int | None, channels: int) -> list[int]:
+    """Indices of all channels except alpha."""
+    return [channel for channel in range(channels) if channel != alpha]
+
+
 @cache
 def _decoding(dtype: str, srgb: bool) -> np.ndarray:
-    values = np.arange(_CODES[dtype] + 1, dtype=np.float64) / _CODES[dtype]
+    values = np.arange(CODES[dtype] + 1, dtype=np.float64) / CODES[dtype]
     return to_linear(values) if srgb else values.astype(np.float32)
 
 

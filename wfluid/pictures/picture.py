@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from wfluid.pictures import color
-from wfluid.pictures.color import LUMINANCE
-from wfluid.pictures.formats import LINEAR, PictureError, first_line
+from wfluid.pictures.color import CODES, LUMINANCE, channels_beside
+from wfluid.pictures.decoding import PillowImage, decoded, taken
+from wfluid.pictures.formats import LINEAR, NUMPY, PictureError, first_line
 from wfluid.pictures.profiles import Profile
 
 
 @dataclass(frozen=True)
 class Picture:
-    """An image in linear light with the primaries of Rec. 709, alpha premultiplied."""
+    """An image in linear light with the primaries of Rec. 709, alpha premultiplied.
+
+    >>> Picture.of("examples/images/cat.png")
+    Picture(451 x 300 px, 3 channels, uint8)
+    >>> grey = Picture.of(np.full((2, 3), 128, dtype=np.uint8))
+    >>> np.asarray(grey).shape, np.asarray(grey).max()
+    ((2, 3, 1), np.uint8(128))
+    """
 
     pixels: np.ndarray
     """Values (height, width, channels), float32; row 0 is the top. Colours beyond Rec. 709 have negative
@@ -34,6 +43,47 @@ class Picture:
     """Colour space of the file's numbers, where its ICC profile says another than sRGB."""
     notes: tuple[str, ...] = ()
     """What a user should know of how the file was read."""
+
+    @classmethod
+    def of(cls, thing: PictureLike, colorspace: str = "auto") -> Picture:
+        """The picture of a path, an image of Pillow or an array; a `Picture` is returned unchanged.
+
+        An array is (height, width) or (height, width, channels): grey, grey and alpha, RGB or RGBA, colours
+        not multiplied by alpha. Its numbers are sRGB: codes of uint8 or uint16, or floats 0 … 1; True is
+        white. `colorspace` says something else: "linear" light, or "data", which are no colours. For files,
+        see `read_picture`. Later changes to the array do not change the picture.
+
+        Raises:
+            TypeError: something else; the message lists what is possible.
+            PictureError: an array of another shape or with floats that look like codes; a file as by
+                `read_picture`.
+        """
+        if isinstance(thing, Picture):
+            return thing
+        if isinstance(thing, str | os.PathLike):
+            return cls(**decoded(thing, colorspace))
+        return cls(**taken(thing, colorspace))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """The numbers of the picture's file (height, width, channels), in their own type.
+
+        Display values for uint8 and uint16, colours not multiplied by alpha: what `Picture.of` takes.
+        `pixels` are linear light.
+
+        Raises:
+            ValueError: `copy` is False: the numbers are computed.
+        """
+        if copy is False:
+            raise ValueError("the numbers of a picture are computed: write np.asarray(picture)")
+        numbers, top = as_stored(self), CODES.get(self.dtype)
+        numbers = numbers if top is None else np.rint(np.clip(numbers, 0.0, 1.0) * top)
+        return numbers.astype(NUMPY[self.dtype] if dtype is None else dtype)
+
+    def __repr__(self) -> str:
+        channels = self.pixels.shape[2]
+        kind = ", data" if self.data else ", with alpha" if self.alpha is not None else ""
+        plural = "" if channels == 1 else "s"
+        return f"Picture({self.width} x {self.height} px, {channels} channel{plural}{kind}, {self.dtype})"
 
     @property
     def width(self) -> int:
@@ -65,9 +115,16 @@ class Picture:
         return replace(self, pixels=pixels)
 
 
-def channels_beside(alpha: int | None, channels: int) -> list[int]:
-    """Indices of all channels except alpha."""
-    return [channel for channel in range(channels) if channel != alpha]
+PictureLike = Picture | str | os.PathLike | np.ndarray | PillowImage
+"""What `Picture.of` takes."""
+
+
+def picture_of(name: str, thing: PictureLike) -> Picture:
+    """`Picture.of`, with a name in its refusals."""
+    try:
+        return Picture.of(thing)
+    except TypeError as error:
+        raise TypeError(f"{name}: {error}") from None
 
 
 def resample(values: np.ndarray, width: int, height: int, filter: str = "triangle") -> np.ndarray:

@@ -5,16 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import numpy as np
-
-from wfluid.domain.checks import check_word
-from wfluid.domain.limits import COLORSPACES
-from wfluid.pictures import color
+from wfluid.pictures.decoding import decoded
 from wfluid.pictures.encoder import file_bytes
 from wfluid.pictures.fitting import Fit, display_window, fit, stored
-from wfluid.pictures.formats import CHANNELS, LARGEST, LINEAR, QUALITIES, Encoding, PictureError
-from wfluid.pictures.picture import Picture, channels_beside
-from wfluid.pictures.reading import Stored, read_stored
+from wfluid.pictures.formats import CHANNELS, LINEAR, QUALITIES, Encoding
+from wfluid.pictures.picture import Picture, PictureLike
 from wfluid.system.atomic import atomic_write
 
 _NOT_KEPT = (
@@ -28,18 +23,6 @@ _NOT_KEPT = (
     "tiff:.*",
 )
 """Attributes of a file that hold for it alone."""
-
-_UPRIGHT = {
-    1: lambda a: a,
-    2: lambda a: a[:, ::-1],
-    3: lambda a: a[::-1, ::-1],
-    4: lambda a: a[::-1],
-    5: lambda a: a.swapaxes(0, 1),
-    6: lambda a: a.swapaxes(0, 1)[:, ::-1],
-    7: lambda a: a.swapaxes(0, 1)[::-1, ::-1],
-    8: lambda a: a.swapaxes(0, 1)[::-1],
-}
-"""Functions that turn a stored array upright, by EXIF orientation (EXIF 2.32, tag 0x0112)."""
 
 
 def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bool = False) -> Picture:
@@ -59,64 +42,13 @@ def read_picture(path: str | os.PathLike, colorspace: str = "auto", *, exact: bo
         PictureError: a file that is missing, unreadable, damaged, deep or too large for the memory; with
             `exact`, also one with values that are not finite.
     """
-    path = Path(path)
-    check_word("colorspace", colorspace, COLORSPACES, PictureError)
-    read = read_stored(path, colorspace)
-    data = read.data or colorspace == "data"
-    srgb = colorspace == "srgb" or (colorspace == "auto" and read.integers and not data)
-    pixels, notes = _linear(read, srgb), read.notes
-    if wrong := pixels.size - np.count_nonzero(np.isfinite(pixels)):
-        if exact:
-            raise PictureError(f"{path}: {wrong} values are not finite")
-        notes += (f"{wrong} values are not finite: NaN becomes 0, infinite ones {LARGEST:g}",)
-        pixels = np.nan_to_num(pixels, copy=False, nan=0.0, posinf=LARGEST, neginf=-LARGEST)
-    upright = _UPRIGHT.get(read.spec.get_int_attribute("Orientation", 1), _UPRIGHT[1])
-    return Picture(
-        np.ascontiguousarray(upright(pixels)),
-        read.alpha,
-        read.dtype,
-        read.spec,
-        srgb,
-        data=data,
-        profile=read.profile,
-        notes=notes,
-    )
+    return Picture(**decoded(path, colorspace, exact=exact))
 
 
-def _linear(read: Stored, srgb: bool) -> np.ndarray:
-    """The numbers of a file in linear light, multiplied by alpha.
-
-    Where integers are multiplied by alpha already, that was done to the encoded numbers, which are divided by
-    it before they are decoded.
-    """
-    numbers, alpha, profile = read.numbers, read.alpha, read.profile
-    colours = channels_beside(alpha, numbers.shape[2])
-    pixels = np.empty(numbers.shape, dtype=np.float32)
-    for channel in range(numbers.shape[2]):
-        coded = srgb and profile is None and channel != alpha
-        pixels[..., channel] = color.decode(numbers[..., channel], coded)
-    if alpha is None:
-        return pixels if profile is None else profile.decode(pixels)
-    opacity = pixels[..., [alpha]]
-    if read.straight or not (srgb or profile):
-        if profile is not None:
-            pixels[..., colours] = profile.decode(pixels[..., colours])
-        if read.straight:
-            pixels[..., colours] *= opacity
-        return pixels
-    stored = color.decode(numbers[..., colours], False)
-    partly = (opacity > 0) & (opacity < 1)
-    straight = np.divide(stored, opacity, out=stored.copy(), where=partly)
-    if profile is None:
-        light = np.where(partly, color.to_linear(straight), pixels[..., colours])
-    else:
-        light = profile.decode(straight)
-    pixels[..., colours] = np.where(partly, light * opacity, light)
-    return pixels
-
-
-def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding | None = None) -> None:
+def write_picture(path: str | os.PathLike, picture: PictureLike, encoding: Encoding | None = None) -> None:
     """Write a still, completely or not at all, in the format of the name's ending.
+
+    `picture` is anything that `Picture.of` takes.
 
     The number type is that of the picture if the format supports it, otherwise the default of the format;
     values are clamped to its range. Channels that the format does not support are dropped; without alpha the
@@ -130,7 +62,7 @@ def write_picture(path: str | os.PathLike, picture: Picture, encoding: Encoding 
             setting, or a picture that the format cannot hold.
         WriteError: the file cannot be written to its end, as on a full disk.
     """
-    path, encoding = Path(path), encoding or Encoding()
+    path, encoding, picture = Path(path), encoding or Encoding(), Picture.of(picture)
     how = fit(path, picture, encoding)
     ending = path.suffix.lower()
     numbers = stored(picture, how)

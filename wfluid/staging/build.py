@@ -10,9 +10,11 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import check_loop
 from wfluid.domain.envelopes import product
+from wfluid.domain.grid import Grid
 from wfluid.domain.limits import INK, KEYFRAME_STEPS, MORPH_VISCOSITY, VISCOSITY
 from wfluid.domain.paths import Place
 from wfluid.domain.timeline import substeps_for
+from wfluid.domain.walls import Walls
 from wfluid.model.densities import Density, PaintedSource, Source
 from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force, Group, LocalForce, flatten
@@ -30,6 +32,7 @@ from wfluid.staging.aims import Aims, aims_of, moves_of
 from wfluid.staging.drawing import Drawing
 from wfluid.staging.images import SceneImages, frame_size, read_noted
 from wfluid.staging.morphs import pair_of, place_in_second, settings_of
+from wfluid.staging.stillness import STILLNESS_CELLS, why_still
 from wfluid.staging.timing import envelope_and_scale
 
 
@@ -147,6 +150,7 @@ class _Builder:
                 layers=layers,
                 points=points,
                 loop=scene.time.loop,
+                units_checked=True,
             )
 
     def _drawing(self) -> Drawing:
@@ -244,6 +248,7 @@ class _Builder:
             with blame("force", n):
                 force = self.drawing.force(table, (self.scene.seed + n) % (SEED_LIMIT + 1))
             self._note_small(n, force)
+            self._note_still(n, force)
             members[table.group].append(force)
         for n, group in enumerate(self.scene.groups):
             with blame("group", n):
@@ -259,6 +264,14 @@ class _Builder:
                 f"force.{n}: its radius of {force.radius * side:g} px is less than a cell of the fluid, "
                 f"{cell * side:.3g} px; use more cells"
             )
+
+    def _note_still(self, n: int, force: Force) -> None:
+        """Note a force that walls, masks or frozen parts hold back, with the reason."""
+        drawing = self.drawing
+        grid = Grid.for_picture(self.picture.width, self.picture.height, STILLNESS_CELLS)
+        why = why_still(force, Walls.parse(self.scene.fluid.walls), drawing.frozen, grid)
+        if why:
+            self.note(f"{self.scene.flags.get(('force', n), f'force.{n}')}: {why}")
 
     def _group(self, group: GroupTable, members: list[Force]) -> Group:
         common = product(group.strength, *self.drawing.named(f"group {group.name}", group.envelope))

@@ -25,6 +25,10 @@ class CoordinateMap:
     displacement: np.ndarray
     """Source minus position at centres [longer side], (ny, nx, 2), x then y."""
 
+    def __repr__(self) -> str:
+        rows, columns, _ = self.displacement.shape
+        return f"CoordinateMap({columns} x {rows} cells)"
+
     @classmethod
     def of_state(cls, state: State, walls: Walls) -> CoordinateMap:
         """A copy of a state's map."""

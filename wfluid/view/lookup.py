@@ -17,7 +17,7 @@ from wfluid.fields.graph import CapturedGraph
 from wfluid.kernels.cell.layout import HALO, Layout, whole_spans
 from wfluid.kernels.cell.strips import together
 from wfluid.kernels.view import lookup
-from wfluid.pictures.picture import Picture
+from wfluid.pictures.picture import Picture, PictureLike, picture_of
 from wfluid.pictures.sampling import EDGES, check_look_up
 from wfluid.system.threads import free_cores, helpers
 
@@ -69,7 +69,7 @@ class LookUp:
 
     def __init__(
         self,
-        picture: Picture,
+        picture: PictureLike,
         grid: Grid,
         walls: Walls,
         device: wp.Device,
@@ -80,6 +80,7 @@ class LookUp:
         edge: str = "clamp",
     ):
         check_look_up(filter, edge)
+        picture = picture_of("LookUp.picture", picture)
         self.device, self.grid, self.walls = device, grid, walls
         self.picture, self.filter = picture, filter
         self.source = PictureOnDevice(picture, edge == "transparent", device)
