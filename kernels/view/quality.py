@@ -18,14 +18,19 @@ def row_map_extremes(
     closed_y: int,
     # outputs
     jacobian_min: Field,
+    column_of_min: Field,
     jacobian_max: Field,
+    folded: Field,
     outside: Field,
 ):
-    """For row t of the map: least and greatest determinant of its Jacobian (central differences of the
-    displacement [cells] at centres), and the number of cells whose source is beyond a closed edge.
+    """For row t of the map: least determinant of its Jacobian (central differences of the displacement
+    [cells] at centres) and its column, the greatest determinant, and the numbers of cells where the
+    determinant is not positive, and whose source is beyond a closed edge.
     """
     least = Real(1.0e30)
     greatest = Real(-1.0e30)
+    column = Real(0.0)
+    folds = Real(0.0)
     count = Real(0.0)
     half = Real(0.5)
     row = index(0, t, pitch)
@@ -36,7 +41,11 @@ def row_map_extremes(
         yx = half * (d_y[k + 1] - d_y[k - 1])
         yy = Real(1.0) + half * (d_y[k + pitch] - d_y[k - pitch])
         det = xx * yy - xy * yx
-        least = wp.min(least, det)
+        if det < least:
+            least = det
+            column = Real(i)
+        if not det > Real(0.0):
+            folds += Real(1.0)
         greatest = wp.max(greatest, det)
         x = Real(i) + half + d_x[k]
         y = Real(t) + half + d_y[k]
@@ -45,5 +54,7 @@ def row_map_extremes(
         if beyond_x or beyond_y:
             count += Real(1.0)
     jacobian_min[t] = least
+    column_of_min[t] = column
+    folded[t] = folds
     jacobian_max[t] = greatest
     outside[t] = count

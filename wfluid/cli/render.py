@@ -13,7 +13,9 @@ from wfluid.animation.estimate import check_memory, estimate
 from wfluid.animation.run import Run
 from wfluid.cli.checks import RunOptions, check_run
 from wfluid.cli.exits import Exit
+from wfluid.cli.folds import Folds
 from wfluid.cli.progress import SearchProgress
+from wfluid.cli.remedies import finer, gentler
 from wfluid.cli.report import Report, write_report
 from wfluid.cli.verdicts import judge_folds, judge_loop, judge_match
 from wfluid.cli.writing import Output, kept_frames, notes_of_outputs, open_writers, write_frames
@@ -69,7 +71,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
     if searched and match:
         _save_match(match, scene, searched, options)
     report = None
-    if scene.outputs:
+    if scene.outputs or (match and match.jacobian[0] <= 0):  # the frames show where it folds
         report, run, writing = _write_frames(staged, match, outputs, options.quiet)
         seconds = {
             "compile": compiling,
@@ -81,7 +83,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
         for output in scene.outputs:
             if output.of == "report":
                 write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
-    return _verdict(searched, match, report) if searched and match else Exit.DONE
+    return _verdict(scene, staged, match, report)
 
 
 def _note(quiet: bool) -> Callable[[str], None]:
@@ -197,8 +199,12 @@ def _write_frames(
     return report, run, writing
 
 
-def _verdict(staged: StagedKeyframes, match: Match, report: Report | None) -> Exit:
+def _verdict(scene: Scene, staged: Staged, match: Match | None, report: Report | None) -> Exit:
     """Whether all points reach their targets, and no frame of the picture folds."""
-    least = min(match.jacobian[0], report.of_b[0] if report else math.inf)
-    folds = judge_folds(least)
+    least = match.jacobian[0] if match else math.inf
+    remedy = f"{gentler(scene, staged)}, or {finer(scene, staged)}"
+    seen = report.folds if report else Folds()
+    folds = judge_folds(seen, least, scene.frames.allow_folds, remedy)
+    if not (match and isinstance(staged, StagedKeyframes)):
+        return folds
     return judge_match(match, staged.aims.side, timed=not isinstance(staged, StagedMorph)) or folds

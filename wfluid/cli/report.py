@@ -13,6 +13,7 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
+from wfluid.cli.folds import Folds
 from wfluid.domain.walls import Walls
 from wfluid.keyframes.match import Match
 from wfluid.model.force import Force, flatten
@@ -51,6 +52,8 @@ class Report:
         }
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
+    folds: Folds = field(default_factory=Folds)
+    """The frames that fold."""
     solves: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Methods, most iterations and largest residuals of projection and diffusion."""
     of_b: list[float] = field(default_factory=lambda: [math.inf, -math.inf])
@@ -61,6 +64,7 @@ class Report:
         side = max(self.animation.picture.width, self.animation.picture.height)
         seen, quality = self.extremes, frame.quality
         self.frames += 1
+        self.folds.add(frame)
         seen["jacobian_min"] = min(seen["jacobian_min"], quality.jacobian_min)
         seen["jacobian_max"] = max(seen["jacobian_max"], quality.jacobian_max)
         for name, value in (
@@ -209,6 +213,7 @@ class Report:
             },
             "seconds": dict(seconds),
             **self.extremes,
+            "folds": self.folds.as_dict(),
             "area": _area(self.extremes),
             **self._loop(seam),
             **self._keyframes(),

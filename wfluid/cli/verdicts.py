@@ -8,6 +8,7 @@ from collections.abc import Callable
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import Seam
 from wfluid.cli.exits import Exit
+from wfluid.cli.folds import Folds
 from wfluid.cli.report import Report
 from wfluid.keyframes.match import REACHED, STOPPED, Match
 
@@ -28,12 +29,18 @@ def judge_match(match: Match, side: float, timed: bool) -> Exit:
     return Exit.INTERRUPTED if match.status == STOPPED else Exit.FAILED
 
 
-def judge_folds(least: float) -> Exit:
-    """Print whether a map folds: its smallest det J, `least`, is 0 or less."""
-    if least > 0:
+def judge_folds(folds: Folds, least: float, allowed: bool, remedy: str) -> Exit:
+    """Print the folds of the frames, or of the flow between them, whose smallest det J is `least`.
+
+    Folds that are allowed are only a warning.
+    """
+    if not folds.frames and least > 0:
         return Exit.DONE
-    remedy = "leave out points whose paths pass close to each other, or use more cells"
-    print(f"wfluid: the picture folds, its smallest det J is {least:.2g}: {remedy}", file=sys.stderr)
+    text = str(folds) if folds.frames else f"the picture folds, its smallest det J is {least:.2g}"
+    if allowed:
+        print(f"wfluid: warning: {text}", file=sys.stderr)
+        return Exit.DONE
+    print(f"wfluid: {text}; try {remedy}; --allow-folds accepts it", file=sys.stderr)
     return Exit.FAILED
 
 

@@ -26,20 +26,28 @@ class MapQuality:
     """Mean length of the displacement [longer side]."""
     outside_fraction: float
     """Fraction of the cells whose source lies beyond a closed edge."""
+    fold_fraction: float
+    """Fraction of the cells where the determinant is not positive: they are folded."""
+    jacobian_min_at: tuple[float, float]
+    """Position x, y of the cell with the least determinant [longer side]."""
 
 
 def measure_map(state: State, warp: CoordinateMap) -> MapQuality:
     """The measures of a state's map; `warp` is its copy on the host (`CoordinateMap.of_state`)."""
     layout, device, grid = state.layout, state.u.device, state.grid
-    least, greatest, outside = (zeros(layout.ny, device) for _ in range(3))
+    rows = [zeros(layout.ny, device) for _ in range(5)]
     closed = [int(not periodic) for periodic in warp.walls.periodic]
     inputs = [state.d_x, state.d_y, layout.nx, layout.ny, layout.pitch, *closed]
-    quality.row_map_extremes.launch(layout.ny, device, inputs, [least, greatest, outside])
+    quality.row_map_extremes.launch(layout.ny, device, inputs, rows)
+    least, column, greatest, folded, outside = (read(row) for row in rows)
     length = np.hypot(*np.moveaxis(warp.displacement, 2, 0))
+    row, cells = int(least.argmin()), grid.nx * grid.ny
     return MapQuality(
-        float(read(least).min()),
-        float(read(greatest).max()),
+        float(least[row]),
+        float(greatest.max()),
         float(length.max()),
         float(length.mean()),
-        float(read(outside).sum()) / (grid.nx * grid.ny),
+        float(outside.sum()) / cells,
+        float(folded.sum()) / cells,
+        ((float(column[row]) + 0.5) * grid.hx, (row + 0.5) * grid.hy),
     )
