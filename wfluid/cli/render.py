@@ -17,7 +17,7 @@ from wfluid.cli.folds import Folds
 from wfluid.cli.progress import SearchProgress
 from wfluid.cli.remedies import finer, gentler
 from wfluid.cli.report import Report, write_report
-from wfluid.cli.verdicts import judge_folds, judge_loop, judge_match
+from wfluid.cli.verdicts import judge_folds, judge_loop, judge_match, judge_smoothness
 from wfluid.cli.writing import Output, kept_frames, notes_of_outputs, open_writers, write_frames
 from wfluid.fields.device import kernels_are_built, open_device
 from wfluid.keyframes.match import STOPPED, Match, match_keyframes
@@ -83,6 +83,8 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
         for output in scene.outputs:
             if output.of == "report":
                 write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
+    if report and not options.quiet:
+        print(f"wfluid: {report.smoothness}", file=sys.stderr)
     return _verdict(scene, staged, match, report)
 
 
@@ -189,7 +191,7 @@ def _write_frames(
     animation = match.animation if match else staged.animation
     morph = Morph(match, staged.pair, staged.settings) if match and isinstance(staged, StagedMorph) else None
     side = staged.aims.side if isinstance(staged, StagedKeyframes) else 1.0
-    report = Report(animation, match, side, morph)
+    report = Report(animation, match, side, morph, staged.arrow)
     run = (morph or animation).frames()
     writing = write_frames(run, outputs, report, quiet)
     for text in morph.notes if morph else ():
@@ -200,7 +202,9 @@ def _write_frames(
 
 
 def _verdict(scene: Scene, staged: Staged, match: Match | None, report: Report | None) -> Exit:
-    """Whether all points reach their targets, and no frame of the picture folds."""
+    """Whether all points reach their targets, and no frame of the picture folds; warns of rough motion."""
+    if report:
+        judge_smoothness(report.smoothness, gentler(scene, staged))
     least = match.jacobian[0] if match else math.inf
     remedy = f"{gentler(scene, staged)}, or {finer(scene, staged)}"
     seen = report.folds if report else Folds()

@@ -10,6 +10,7 @@ from wfluid.animation.loops import Seam
 from wfluid.cli.exits import Exit
 from wfluid.cli.folds import Folds
 from wfluid.cli.report import Report
+from wfluid.cli.smoothness import Smoothness
 from wfluid.keyframes.match import REACHED, STOPPED, Match
 
 STREAMED = 0.5
@@ -42,6 +43,12 @@ def judge_folds(folds: Folds, least: float, allowed: bool, remedy: str) -> Exit:
         return Exit.DONE
     print(f"wfluid: {text}; try {remedy}; --allow-folds accepts it", file=sys.stderr)
     return Exit.FAILED
+
+
+def judge_smoothness(smoothness: Smoothness, remedy: str) -> None:
+    """Print a warning if the picture moves too far or is strained too much."""
+    if complaint := smoothness.complaint():
+        print(f"wfluid: warning: {complaint}; try {remedy}", file=sys.stderr)
 
 
 def judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[[str], None]) -> None:

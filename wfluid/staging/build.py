@@ -27,6 +27,7 @@ from wfluid.scene.keyframes import KeyframesTable, MorphTable
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SchemaError, blame
 from wfluid.staging.aims import Aims, aims_of, moves_of
+from wfluid.staging.arrows import longest_arrow
 from wfluid.staging.drawing import Drawing
 from wfluid.staging.images import SceneImages, frame_size, read_noted
 from wfluid.staging.morphs import pair_of, place_in_second, settings_of
@@ -51,6 +52,8 @@ class Staged:
 
     animation: Animation
     """The animation; of a morph the flow."""
+    arrow: float | None
+    """The longest arrow that is drawn [longer side]; None if not everything that moves has one."""
 
 
 @dataclass(frozen=True)
@@ -83,14 +86,14 @@ def stage_all(
     try:
         builder = _Builder(scene, note)
         if scene.keyframes is None:
-            return Staged(builder.animation(device))
+            return Staged(builder.animation(device), builder.arrow())
         if scene.morph is None:
             aims = builder.aims(scene.keyframes, partial(builder.drawing.place, "to"))
-            return StagedKeyframes(builder.animation(device), aims)
+            return StagedKeyframes(builder.animation(device), builder.arrow(aims), aims)
         pair, settings = builder.morph(scene.morph)
         second = partial(place_in_second, morph=scene.morph, pair=pair, drawing=builder.drawing)
         aims = builder.aims(scene.keyframes, second)
-        return StagedMorph(builder.animation(device), aims, pair, settings)
+        return StagedMorph(builder.animation(device), builder.arrow(aims), aims, pair, settings)
     except SchemaError as error:
         raise scene.error(error) from error
 
@@ -122,6 +125,10 @@ class _Builder:
                 substeps = substeps_for(times, self.timeline.fps, KEYFRAME_STEPS)
                 self.timeline = replace(self.timeline, substeps=substeps)
             return aims_of(self.scene, keyframes, moves, self.drawing, self.timeline, destination, self.note)
+
+    def arrow(self, aims: Aims | None = None) -> float | None:
+        """The longest arrow [longer side]."""
+        return longest_arrow(self.scene, self.drawing.side, aims)
 
     def animation(self, device: str | None) -> Animation:
         """The animation."""
