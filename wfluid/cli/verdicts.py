@@ -57,6 +57,6 @@ def judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[
     side = max(animation.picture.width, animation.picture.height)
     if animation.loop == "oscillate" and drift * side > STREAMED * longest:
         note(
-            f"the picture drifts by {drift * side:.0f} px over the loop, subtracted from its frames: "
+            f"the picture drifts by {drift * side:.0f} px over a lap, taken off its frames: "
             "a loop of one period, more viscosity or a smaller force drifts less"
         )

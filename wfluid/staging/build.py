@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from wfluid.animation.animation import Animation
-from wfluid.animation.loops import check_loop
+from wfluid.animation.loops import acting_time, check_loop
 from wfluid.domain.envelopes import product
 from wfluid.domain.limits import INK, KEYFRAME_STEPS, MORPH_VISCOSITY, VISCOSITY
 from wfluid.domain.paths import Place
@@ -160,7 +160,8 @@ class _Builder:
         """The frame, times, envelopes and masks that the scene's forces refer to."""
         scene = self.scene
         width, height = frame_size(scene.picture.size, "picture", self.picture)
-        plain = Drawing(width, height, self.timeline.duration, scene.fluid.scheme, scene.time.loop)
+        acting = acting_time(scene.time.loop, self.timeline)
+        plain = Drawing(width, height, acting, scene.fluid.scheme, scene.time.loop)
         envelopes, weight, frozen = {}, None, None
         for name, table in scene.envelopes.items():
             with blame("envelopes", name):
