@@ -64,11 +64,17 @@ def test_a_fold_is_reported_with_place_time_and_size(folder):
 
 def test_the_remedy_names_options_of_the_command_in_use(folder):
     made = wfluid("animate", "small.png", "-o", "a.gif", *HARD, *GRID, "--save-scene", "a.toml")
-    for option in ("--viscosity 0.0004", "--cells 48", "--substeps 4", "--allow-folds"):
+    for option in ("--loop oscillate", "--viscosity 0.0004", "--cells 48", "--substeps 4", "--allow-folds"):
         assert option in made.stderr
     rendered = wfluid("render", "a.toml", "-o", "b.gif")
     assert rendered.returncode == 1
-    for option in ("viscosity.value=0.0004", "fluid.cells=48", "time.substeps=4", "--allow-folds"):
+    for option in (
+        "time.loop=oscillate",
+        "viscosity.value=0.0004",
+        "fluid.cells=48",
+        "time.substeps=4",
+        "--allow-folds",
+    ):
         assert option in rendered.stderr
 
 

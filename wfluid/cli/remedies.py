@@ -17,9 +17,10 @@ COMMAND_LINE = "command line"
 """Source of a scene that is made from flags."""
 
 
-def option(scene: Scene, flag: str, key: str, value: float) -> str:
+def option(scene: Scene, flag: str, key: str, value: float | str) -> str:
     """The option that sets a key: its flag, or --set where the scene is a file."""
-    return f"{flag} {value:.3g}" if scene.source == COMMAND_LINE else f"--set {key}={value:.3g}"
+    shown = value if isinstance(value, str) else f"{value:.3g}"
+    return f"{flag} {shown}" if scene.source == COMMAND_LINE else f"--set {key}={shown}"
 
 
 def gentler(scene: Scene, staged: Staged) -> str:
@@ -27,7 +28,10 @@ def gentler(scene: Scene, staged: Staged) -> str:
     if isinstance(staged, StagedKeyframes):
         time = "" if isinstance(staged, StagedMorph) else "later arrival times, "
         return f"{_stiffer(scene, staged)}, {time}or fewer points whose paths pass close to each other"
-    return f"{_stiffer(scene, staged)}, or a force that is weaker, wider or acts longer"
+    looped = option(scene, "--loop", "time.loop", "oscillate")
+    swings = any(getattr(force, "period", None) for force in scene.forces) and scene.time.loop is None
+    loop = f"{looped}, which keeps swings about their place, " if swings else ""
+    return f"{loop}{_stiffer(scene, staged)}, or a force that is weaker, wider or acts longer"
 
 
 def finer(scene: Scene, staged: Staged) -> str:
