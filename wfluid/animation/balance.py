@@ -33,6 +33,10 @@ class Balance:
     acceleration: tuple[np.ndarray, ...]
     """Steady acceleration [longer side/s^2]."""
 
+    def act(self, runner: Simulation) -> None:
+        """Accelerate the current fluid for the duration of a frame."""
+        runner.solver.add_velocity(runner.now, *(g / runner.timeline.fps for g in self.acceleration))
+
 
 def lap_of(
     runner: Simulation, forces: Sequence[Force], frames: int, balance: Balance
@@ -40,10 +44,9 @@ def lap_of(
     """The fluid at each frame of a lap, from the untouched picture; the balance acts once a frame."""
     runner.solver.set_velocity(runner.now, *balance.velocity)
     runner.untouch()
-    push = tuple(g / runner.timeline.fps for g in balance.acceleration)
     for moment in runner.moments(forces, frames):
         yield moment
-        runner.solver.add_velocity(runner.now, *push)
+        balance.act(runner)
 
 
 def find_balance(

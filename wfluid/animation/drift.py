@@ -8,7 +8,7 @@ folds. Velocities and maps are displacements (ny, nx, 2) [longer side]; (a b)(x)
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -60,6 +60,16 @@ class Maps:
         velocity = self._corrected(np.zeros_like(drift), drift, self._left_between)
         velocity = self._corrected(velocity, drift, self._left_after)
         return velocity, self._left_after(velocity, drift)
+
+    def without_drift(
+        self, lap: Sequence[np.ndarray], frames: int, velocity: np.ndarray, left: np.ndarray
+    ) -> list[np.ndarray]:
+        """The maps of a lap of `frames` frames without its drift, the logarithm of which is given."""
+        parts = [n / frames for n in range(len(lap))]
+        return [
+            self.composed(self.flow(-s * velocity), displacement) - s * left
+            for s, displacement in zip(parts, lap, strict=True)
+        ]
 
     def _left_between(self, velocity: np.ndarray, drift: np.ndarray) -> np.ndarray:
         """flow(-w / 2) drift flow(-w / 2): as a correction of w it has no error of first order in w (BCH)."""

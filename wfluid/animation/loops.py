@@ -176,7 +176,7 @@ def _oscillating(
         s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
         fade = ease(s)  # densities do not swing: their end is blended into their beginning
         poured = Snapshot.sum_of((1 - fade, snapshot), (fade, lap[0][0]))
-        yield SimulatedFrame(_moved(runner, closed[at], replace(snapshot, poured=poured.poured)), solve)
+        yield SimulatedFrame(moved_state(runner, closed[at], replace(snapshot, poured=poured.poured)), solve)
 
 
 def laps_of(forces: Sequence[Force], length: float, frames: int, fluid: Fluid) -> int:
@@ -198,18 +198,12 @@ def _periods(force: Force) -> list[float]:
 
 def _closed(lap: list[np.ndarray], maps: Maps, seam: Seam) -> list[np.ndarray]:
     """The maps of a lap without its drift, which is the last of them."""
-    frames = len(lap) - 1
     drift = np.hypot(*np.moveaxis(lap[-1], 2, 0))
     seam.drift_max, seam.drift_mean = float(drift.max()), float(drift.mean())
-    velocity, left = maps.logarithm(lap[-1])
-    parts = [n / frames for n in range(frames + 1)]
-    return [
-        maps.composed(maps.flow(-s * velocity), displacement) - s * left
-        for s, displacement in zip(parts, lap, strict=True)
-    ]
+    return maps.without_drift(lap, len(lap) - 1, *maps.logarithm(lap[-1]))
 
 
-def _moved(runner: Simulation, displacement: np.ndarray, snapshot: Snapshot) -> State:
+def moved_state(runner: Simulation, displacement: np.ndarray, snapshot: Snapshot) -> State:
     """The runner's state with a map, the points that it moves, and the densities of a snapshot."""
     sources = runner.solver.rest(runner.points).points
     if len(sources):

@@ -154,6 +154,7 @@ class _Builder:
                 layers=layers,
                 points=points,
                 loop=scene.time.loop,
+                balanced=scene.keyframes is None and scene.fluid.scheme != "paper",
             )
 
     def _drawing(self) -> Drawing:
