@@ -1,14 +1,16 @@
-"""Figures of a frame: extremes and counts of each row, one row per line; the host combines the rows."""
+"""Figures of a frame at every cell; the host combines them."""
 
 import warp as wp
-from wfluid.kernels.cell.layout import index
-from wfluid.kernels.cell.program import lines
+from wfluid.kernels.cell.native import inside
+from wfluid.kernels.cell.program import cells
 from wfluid.kernels.cell.real import Field, Real
 
 
-@lines
-def row_map_extremes(
-    t: int,
+@cells
+def measure(
+    i: int,
+    j: int,
+    k: int,
     d_x: Field,
     d_y: Field,
     nx: int,
@@ -17,33 +19,27 @@ def row_map_extremes(
     closed_x: int,
     closed_y: int,
     # outputs
-    jacobian_min: Field,
-    jacobian_max: Field,
+    jacobian: Field,
+    stretch: Field,
     outside: Field,
 ):
-    """For row t of the map: least and greatest determinant of its Jacobian (central differences of the
-    displacement [cells] at centres), and the number of cells whose source is beyond a closed edge.
+    """The map at centre k: the determinant of its Jacobian (central differences of the displacement [cells]);
+    the largest stretch of a length, forwards or backwards: the larger of s and 1 / r, for singular values s
+    and r <= s; and 1 where the source is beyond a closed edge, otherwise 0.
     """
-    least = Real(1.0e30)
-    greatest = Real(-1.0e30)
-    count = Real(0.0)
+    k = inside(k)
     half = Real(0.5)
-    row = index(0, t, pitch)
-    for i in range(nx):
-        k = row + i
-        xx = Real(1.0) + half * (d_x[k + 1] - d_x[k - 1])
-        xy = half * (d_x[k + pitch] - d_x[k - pitch])
-        yx = half * (d_y[k + 1] - d_y[k - 1])
-        yy = Real(1.0) + half * (d_y[k + pitch] - d_y[k - pitch])
-        det = xx * yy - xy * yx
-        least = wp.min(least, det)
-        greatest = wp.max(greatest, det)
-        x = Real(i) + half + d_x[k]
-        y = Real(t) + half + d_y[k]
-        beyond_x = closed_x == 1 and (x < Real(0.0) or x > Real(nx))
-        beyond_y = closed_y == 1 and (y < Real(0.0) or y > Real(ny))
-        if beyond_x or beyond_y:
-            count += Real(1.0)
-    jacobian_min[t] = least
-    jacobian_max[t] = greatest
-    outside[t] = count
+    xx = Real(1.0) + half * (d_x[k + 1] - d_x[k - 1])
+    xy = half * (d_x[k + pitch] - d_x[k - pitch])
+    yx = half * (d_y[k + 1] - d_y[k - 1])
+    yy = Real(1.0) + half * (d_y[k + pitch] - d_y[k - pitch])
+    jacobian[k] = xx * yy - xy * yx
+    turned = wp.sqrt((xx + yy) * (xx + yy) + (yx - xy) * (yx - xy))
+    sheared = wp.sqrt((xx - yy) * (xx - yy) + (yx + xy) * (yx + xy))
+    smaller = wp.max(half * wp.abs(turned - sheared), Real(1.0e-6))
+    stretch[k] = wp.max(half * (turned + sheared), Real(1.0) / smaller)
+    x = Real(i) + half + d_x[k]
+    y = Real(j) + half + d_y[k]
+    beyond_x = closed_x == 1 and (x < Real(0.0) or x > Real(nx))
+    beyond_y = closed_y == 1 and (y < Real(0.0) or y > Real(ny))
+    outside[k] = wp.where(beyond_x or beyond_y, Real(1.0), Real(0.0))

@@ -215,6 +215,7 @@ FLAGS = {
     "--scale": ("0.5", {"frames": {"scale": 0.5}}),
     "--filter": ("lanczos", {"frames": {"filter": "lanczos"}}),
     "--edge": ("mirror", {"frames": {"edge": "mirror"}}),
+    "--allow-folds": ("", {"frames": {"allow_folds": True}}),
     "--background": ("#3060c0", {"frames": {"background": "#3060c0"}}),
     "--colorspace": ("linear", {"picture": {"file": "p.png", "colorspace": "linear"}}),
     "--start": ("7 -o a.gif", {"output": [{"file": "a.gif", "start": 7}]}),

@@ -33,7 +33,8 @@ FORCE_NAMES = {
 KEYFRAMES = {key for key in KEYS if "keyframes" in key[0]}
 MORPH = {key for key in KEYS if key[0] == "[morph]"}
 OUTPUTS = {key for key in KEYS if key[0] == OUTPUT}
-ELSEWHERE = {("at the top", "wfluid"), ("[frames]", "background")} | FORCE_NAMES | OUTPUTS | KEYFRAMES | MORPH
+OF_A_RUN = {("at the top", "wfluid"), ("[frames]", "background"), ("[frames]", "allow_folds")}
+ELSEWHERE = OF_A_RUN | FORCE_NAMES | OUTPUTS | KEYFRAMES | MORPH
 """Keys that do not change a staged animation: tests below, and of keyframes and morphs, are about them."""
 
 SETTINGS = {(heading, name): table.keys[name] for heading, _, table in tables() for name in table.keys}

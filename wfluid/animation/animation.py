@@ -13,6 +13,7 @@ from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam, check_loop, fit_to_loop, frames_of, loop_frames
 from wfluid.animation.run import Run, RunTimes
 from wfluid.animation.simulation import SimulatedFrame, Simulation
+from wfluid.animation.swings import balanced_moments, swing_period
 from wfluid.domain.checks import check_whole
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import CELLS, CELLS_LIMIT, FPS, LEAST_CELLS, SIZE_LIMIT
@@ -70,6 +71,8 @@ class Animation:
     """Positions x, y of points of the picture that are tracked [longer side]."""
     loop: str | None = None
     """Kind of loop: "oscillate", "pingpong" or "crossfade"; None for an animation with an end."""
+    balanced: bool = False
+    """Whether swings that last stay about their place: a steady force balances the streaming they cause."""
 
     units_checked: bool = field(default=False, compare=False)
     """Whether places and vectors are known not to be pixels: those of a scene, and of a changed copy."""
@@ -140,9 +143,17 @@ class Animation:
         """The solver; the first access opens the device and loads the kernels."""
         return Solver(self.grid, self.fluid, open_device(self.device))
 
+    @property
+    def _swing_period(self) -> float:
+        """The period of swings that are balanced [s]; 0 if none are."""
+        return swing_period(self._acting, self.fluid, self.timeline) if self.balanced else 0.0
+
     def _moments(self, seam: Seam | None) -> Iterator[SimulatedFrame]:
         """The fluid at every frame; the measurements of a loop go to `seam`."""
         simulation = Simulation(self.solver, self.timeline, self.points)
+        if seam is None and self._swing_period:
+            arguments = self.solver, self.timeline, self._acting, self.points, self._swing_period
+            return balanced_moments(*arguments)
         if seam is None:
             return simulation.moments(self._acting, self.timeline.frames - 1)
         return loop_frames(self.loop, simulation, self._acting, self._loop_frames, self.timeline.fps, seam)

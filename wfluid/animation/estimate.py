@@ -30,7 +30,7 @@ PROGRAM = 240e6
 DENSITY_FIELDS = 17
 """Arrays of the grid's size for a density that diffuses."""
 
-LOOP_FRAMES = {"oscillate": (1.0, 2.0), "pingpong": (0.5, 0.5), "crossfade": (0.25, 1.25)}
+LOOP_FRAMES = {"oscillate": (3.0, 6.0), "pingpong": (0.5, 0.5), "crossfade": (0.25, 1.25)}
 """By kind of loop: the fraction of its frames that are kept, and that are simulated."""
 
 FIELDS_A_STEP = 6

@@ -1,9 +1,8 @@
 """Loops: animations whose last frame is followed by the first.
 
-"oscillate"  All periods are fitted to the loop, so that the flow is periodic. An impulse at the start of
-             each force makes its velocity swing about zero; one lap is run for the flow to become periodic,
-             and the loop begins with the untouched picture. A swinging fluid also streams slowly: that
-             drift is subtracted evenly over the loop, and the jump of velocity at the seam near the seam.
+"oscillate"  All periods are fitted to the loop, and an impulse at the start of each force makes its velocity
+             swing about zero. A swinging fluid also streams: a steady force balances that, and a flow takes
+             off the drift that is left, evenly over the loop, which begins with the untouched picture.
 "pingpong"   Forwards, then backwards.
 "crossfade"  The frames after the end are blended into the beginning. Maps are blended, not colours, so that
              nothing appears double.
@@ -18,20 +17,26 @@ from itertools import pairwise
 
 import numpy as np
 
+from wfluid.animation.balance import find_balance, lap_of
+from wfluid.animation.drift import Maps
 from wfluid.animation.simulation import SimulatedFrame, Simulation
 from wfluid.animation.snapshot import Snapshot
 from wfluid.domain.checks import check_word
 from wfluid.domain.envelopes import Envelope, Instantaneous, Product, product
 from wfluid.domain.limits import LOOPS
 from wfluid.domain.oscillator import Oscillator
+from wfluid.domain.paths import Path
 from wfluid.domain.piecewise import ease
+from wfluid.domain.timeline import Timeline
+from wfluid.fields.state import State
+from wfluid.model.fluid import Fluid
 from wfluid.model.force import Force
 from wfluid.model.gaussian_forces import Growth
 from wfluid.model.noise_force import NoiseForce
 from wfluid.model.uniform_forces import Buoyancy
 
 FADE = 0.25
-"""Fraction of a loop over which its end is blended into its beginning, or velocities are matched."""
+"""Fraction of a loop over which its end is blended into its beginning."""
 
 
 @dataclass
@@ -48,7 +53,7 @@ class Seam:
     velocity_mean: float = 0.0
     """Mean of that difference [longer side/s]."""
     drift_max: float = 0.0
-    """Largest drift that was subtracted from an oscillating loop [longer side]."""
+    """Largest drift that was taken off an oscillating loop [longer side]."""
     drift_mean: float = 0.0
     """Mean of that drift [longer side]."""
 
@@ -121,6 +126,13 @@ def frames_of(loop: str, frames: int) -> int:
     return 2 * max(1, round(frames / 2)) if loop == "pingpong" else max(1, frames)
 
 
+def acting_time(loop: str | None, timeline: Timeline) -> float:
+    """The time in which forces act by default [s]: of a pingpong its way out, at whose end it turns."""
+    return (
+        frames_of(loop, timeline.frames - 1) / 2 / timeline.fps if loop == "pingpong" else timeline.duration
+    )
+
+
 def loop_frames(
     loop: str, runner: Simulation, forces: Sequence[Force], frames: int, fps: float, seam: Seam
 ) -> Iterator[SimulatedFrame]:
@@ -149,37 +161,58 @@ def loop_frames(
 def _oscillating(
     runner: Simulation, forces: Sequence[Force], frames: int, seam: Seam
 ) -> Iterator[SimulatedFrame]:
-    """One lap for the flow to become periodic, then one from the untouched picture, bent to close."""
-    struck = starting_impulses(
-        forces, runner.timeline.time_of(frames * runner.timeline.steps_per_frame), frames
-    )
-    for _ in runner.moments(forces, frames, struck):
-        pass
-    runner.untouch()
-    lap = [(Snapshot.of(moment.state), moment.solve) for moment in runner.moments(forces, frames + 1)]
-    first, second, last, after = (lap[n][0] for n in (0, 1, frames, frames + 1))
-    drift = np.hypot(*last.onto(runner.spare).displacement)
-    seam.drift_max, seam.drift_mean = float(drift.max()), float(drift.mean())
-    for n, (snapshot, solve) in enumerate(lap[: frames + 1]):
-        # less n / N (last - first), and less the bend times (after - last) - (second - first)
-        part, bend = n / frames, _bend(n, frames)
-        weights = (1.0, part - bend, bend, bend - part, -bend)
-        terms = zip(weights, (snapshot, first, second, last, after), strict=True)
-        closed = Snapshot.sum_of(*terms)
+    """Laps from the untouched picture, all alike, in a fluid that returns after each."""
+    timeline = runner.timeline
+    laps = laps_of(forces, timeline.time_of(frames * timeline.steps_per_frame), frames, runner.solver.fluid)
+    steps = frames // laps
+    struck = starting_impulses(forces, timeline.time_of(frames * timeline.steps_per_frame), frames)
+    balance = find_balance(runner, forces, steps, struck)
+    lap = [(Snapshot.of(moment.state), moment.solve) for moment in lap_of(runner, forces, steps, balance)]
+    maps = [np.stack(snapshot.onto(runner.spare).displacement, axis=2) for snapshot, _ in lap]
+    closed = _closed(maps, Maps(runner.solver), seam)
+    for n in range(frames + 1):
+        at = n % steps if n < frames else steps
+        snapshot, solve = lap[at]
         s = max(0.0, 1.0 - (frames - n) / max(1.0, FADE * frames))
         fade = ease(s)  # densities do not swing: their end is blended into their beginning
-        poured = Snapshot.sum_of((1 - fade, snapshot), (fade, first))
-        yield SimulatedFrame(Snapshot(closed.moved, poured.poured).onto(runner.now), solve)
+        poured = Snapshot.sum_of((1 - fade, snapshot), (fade, lap[0][0]))
+        yield SimulatedFrame(moved_state(runner, closed[at], replace(snapshot, poured=poured.poured)), solve)
 
 
-def _bend(n: int, frames: int) -> float:
-    """A displacement that adds a velocity of 1/2 a frame at a loop's end and -1/2 at its beginning.
+def laps_of(forces: Sequence[Force], length: float, frames: int, fluid: Fluid) -> int:
+    """The number of equal laps of a loop of `length` seconds, each of a whole number of frames."""
+    periods = [period for force in forces for period in _periods(force)]
+    if fluid.densities or not isinstance(fluid.viscosity, float) or not all(periods):
+        return 1
+    return math.gcd(frames, *(round(length / period) for period in periods))
 
-    It is 0 there, and from `FADE` of the loop away.
-    """
-    reach = max(1.0, FADE * frames)
-    s = max(0.0, 1.0 - min(n, frames - n) / reach)
-    return reach / 2 * (s**3 - s**2)
+
+def _periods(force: Force) -> list[float]:
+    """The periods of a force; 0 where something of it is not periodic."""
+    factors = force.envelope.factors if isinstance(force.envelope, Product) else (force.envelope,)
+    found = [factor.period if isinstance(factor, Oscillator) else 0.0 for factor in factors]
+    if any(isinstance(value, Path) for value in vars(force).values()):
+        found.append(0.0)
+    return [*found, force.period] if isinstance(force, NoiseForce) and force.period else found
+
+
+def _closed(lap: list[np.ndarray], maps: Maps, seam: Seam) -> list[np.ndarray]:
+    """The maps of a lap without its drift, which is the last of them."""
+    drift = np.hypot(*np.moveaxis(lap[-1], 2, 0))
+    seam.drift_max, seam.drift_mean = float(drift.max()), float(drift.mean())
+    return maps.without_drift(lap, len(lap) - 1, *maps.logarithm(lap[-1]))
+
+
+def moved_state(runner: Simulation, displacement: np.ndarray, snapshot: Snapshot) -> State:
+    """The runner's state with a map, the points that it moves, and the densities of a snapshot."""
+    sources = runner.solver.rest(runner.points).points
+    if len(sources):
+        grid, guess = runner.solver.grid, snapshot.onto(runner.now).points
+        places = Maps(runner.solver).places(displacement, sources, guess) / (grid.hx, grid.hy)
+        snapshot = replace(snapshot, moved=(*snapshot.moved[:2], *places.T))
+    state = snapshot.onto(runner.now)
+    runner.solver.set_map(state, displacement)
+    return state
 
 
 def _turning(runner: Simulation, forces: Sequence[Force], frames: int, _: Seam) -> Iterator[SimulatedFrame]:

@@ -46,7 +46,7 @@ class Simulation:
     """Steps a fluid from frame to frame, from rest on."""
 
     def __init__(self, solver: Solver, timeline: Timeline, points: np.ndarray | Sequence = ()):
-        self.solver, self.timeline, self._points = solver, timeline, points
+        self.solver, self.timeline, self.points = solver, timeline, points
         self.now, self.spare = solver.rest(points), solver.rest(points)
         self._warned = False
 
@@ -84,7 +84,7 @@ class Simulation:
 
     def untouch(self) -> None:
         """Reset map, densities and points to those at rest; the velocity stays."""
-        rest = self.solver.rest(self._points)
+        rest = self.solver.rest(self.points)
         for untouched, array in zip(rest.seen, self.now.seen, strict=True):
             copy(untouched, array)
 

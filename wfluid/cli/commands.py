@@ -34,7 +34,8 @@ def run_render(options: argparse.Namespace) -> int:
     """Read a scene, change the values given by --set, and run it."""
     from wfluid.scene.toml_file import read_scene
 
-    scene = read_scene(options.scene).with_values(options.set)
+    settings = [*options.set, *(["frames.allow_folds=true"] if options.allow_folds else [])]
+    scene = read_scene(options.scene).with_values(settings)
     return _run(scene.writing(options.output, options.report), options)
 
 

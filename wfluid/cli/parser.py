@@ -31,12 +31,15 @@ HELP = {
 """Short descriptions, by command."""
 
 DESCRIPTIONS = {
-    "animate": "Move a picture with forces and write the frames.",
+    "animate": "Move a picture with forces and write the frames. The exit code is 1 if the picture folds.",
     "keyframes": "Move points of a picture to targets at given times: a search finds the forces. "
-    "The exit code is 1 if the distance of a point from its target is larger than the tolerance.",
+    "The exit code is 1 if the distance of a point from its target is larger than the tolerance, or if the "
+    "picture folds.",
     "morph": "Morph one picture into another: a search finds the flow that moves points of the first picture "
-    "to points of the second. The exit code is 1 if a distance is larger than the tolerance.",
-    "render": "Run a scene file, a TOML file that describes one shot.",
+    "to points of the second. The exit code is 1 if a distance is larger than the tolerance, or if a picture "
+    "folds.",
+    "render": "Run a scene file, a TOML file that describes one shot. The exit code is 1 if the picture "
+    "folds.",
     "check-gradient": "Test the gradient with respect to every variable of a scene by Taylor rates, in "
     "double precision: a rate of 2 is right, 1 is wrong. The exit code is 1 if a rate is below 1.9.",
     "warmup": "Compile the kernels for a device, so that the first animation starts at once.",
@@ -166,6 +169,7 @@ def _add_render_flags(parser: Parser, _: str) -> None:
         "-o", "--output", **repeated("OUT", "write the picture to OUT instead of the scene's outputs")
     )
     _add_scene_file(parser)
+    parser.add_argument("--allow-folds", action="store_true", help="accept frames in which the picture folds")
     add_plot(parser)
     add_run(parser)
 

@@ -13,10 +13,12 @@ from wfluid.animation.estimate import check_memory, estimate
 from wfluid.animation.run import Run
 from wfluid.cli.checks import RunOptions, check_run
 from wfluid.cli.exits import Exit
+from wfluid.cli.folds import Folds
 from wfluid.cli.hints import fitted_hint
 from wfluid.cli.progress import SearchProgress
+from wfluid.cli.remedies import finer, gentler
 from wfluid.cli.report import Report, write_report
-from wfluid.cli.verdicts import ending, judge_folds, judge_loop, judge_match
+from wfluid.cli.verdicts import ending, judge_folds, judge_loop, judge_match, judge_smoothness
 from wfluid.cli.writing import (
     Output,
     finished,
@@ -81,7 +83,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
         _save_match(match, scene, searched, options)
         beside += [str(options.plot)] if options.plot else []
     report = None
-    if scene.outputs:
+    if scene.outputs or (match and match.jacobian[0] <= 0):  # the frames show where it folds
         report, run, writing = _write_frames(staged, match, outputs, options)
         seconds = {
             "compile": compiling,
@@ -94,7 +96,7 @@ def run_scene(scene: Scene, options: RunOptions) -> Exit:
             if output.of == "report":
                 write_report(scene.folder / output.file, report.as_dict(seconds, run.seam))
                 beside.append(near(scene.folder / output.file))
-    code = _verdict(searched, match, report, options.verbose) if searched and match else Exit.DONE
+    code = _verdict(scene, staged, match, report, options.verbose)
     side = searched.aims.side if searched else 1.0
     names = [*finished(outputs), *beside]
     _end(ending(names, report, match, side, time.perf_counter() - began), options.quiet)
@@ -211,7 +213,7 @@ def _write_frames(
     animation = match.animation if match else staged.animation
     morph = Morph(match, staged.pair, staged.settings) if match and isinstance(staged, StagedMorph) else None
     side = staged.aims.side if isinstance(staged, StagedKeyframes) else 1.0
-    report = Report(animation, match, side, morph)
+    report = Report(animation, match, side, morph, staged.arrow)
     run = (morph or animation).frames()
     writing = write_frames(run, outputs, report, options.quiet)
     for text in morph.notes if morph else ():
@@ -221,9 +223,15 @@ def _write_frames(
     return report, run, writing
 
 
-def _verdict(staged: StagedKeyframes, match: Match, report: Report | None, verbose: bool) -> Exit:
-    """Whether all points reach their targets, and no frame of the picture folds."""
-    least = min(match.jacobian[0], report.of_b[0] if report else math.inf)
-    folds = judge_folds(least)
+def _verdict(scene: Scene, staged: Staged, match: Match | None, report: Report | None, verbose: bool) -> Exit:
+    """Whether all points reach their targets, and no frame of the picture folds; warns of rough motion."""
+    if report:
+        judge_smoothness(report.smoothness, gentler(scene, staged))
+    least = match.jacobian[0] if match else math.inf
+    remedy = f"{gentler(scene, staged)}, or {finer(scene, staged)}"
+    seen = report.folds if report else Folds()
+    folds = judge_folds(seen, least, scene.frames.allow_folds, remedy)
+    if not (match and isinstance(staged, StagedKeyframes)):
+        return folds
     timed = not isinstance(staged, StagedMorph)
     return judge_match(match, staged.aims.side, timed, verbose) or folds

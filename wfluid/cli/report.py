@@ -13,6 +13,8 @@ from typing import Any
 from wfluid.animation.animation import Animation
 from wfluid.animation.frame import Frame
 from wfluid.animation.loops import Seam
+from wfluid.cli.folds import Folds
+from wfluid.cli.smoothness import Smoothness
 from wfluid.domain.walls import Walls
 from wfluid.keyframes.match import Match
 from wfluid.model.force import Force, flatten
@@ -35,6 +37,8 @@ class Report:
     """The longer side in the scene's pixels."""
     morph: Morph | None = None
     """The morph, whose flow the animation is."""
+    arrow: float | None = None
+    """The longest arrow [longer side]; None if not everything that moves has one."""
     frames: int = 0
     """Frames so far."""
     extremes: dict[str, float] = field(
@@ -51,16 +55,26 @@ class Report:
         }
     )
     """Over all frames; the mean displacement is that of the frame where it is largest."""
+    folds: Folds = field(default_factory=Folds)
+    """The frames that fold."""
+    smoothness: Smoothness = field(init=False)
+    """Displacement and strain."""
     solves: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Methods, most iterations and largest residuals of projection and diffusion."""
     of_b: list[float] = field(default_factory=lambda: [math.inf, -math.inf])
     """Smallest and largest det J of the map into a morph's second picture."""
+
+    def __post_init__(self) -> None:
+        picture = self.animation.picture
+        self.smoothness = Smoothness(max(picture.width, picture.height), self.arrow)
 
     def add(self, frame: Frame) -> None:
         """Add the measures of a frame."""
         side = max(self.animation.picture.width, self.animation.picture.height)
         seen, quality = self.extremes, frame.quality
         self.frames += 1
+        self.folds.add(frame)
+        self.smoothness.add(frame)
         seen["jacobian_min"] = min(seen["jacobian_min"], quality.jacobian_min)
         seen["jacobian_max"] = max(seen["jacobian_max"], quality.jacobian_max)
         for name, value in (
@@ -209,6 +223,8 @@ class Report:
             },
             "seconds": dict(seconds),
             **self.extremes,
+            "smoothness": self.smoothness.as_dict(),
+            "folds": self.folds.as_dict(),
             "area": _area(self.extremes),
             **self._loop(seam),
             **self._keyframes(),

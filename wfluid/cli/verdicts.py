@@ -8,7 +8,9 @@ from collections.abc import Callable, Sequence
 from wfluid.animation.animation import Animation
 from wfluid.animation.loops import Seam
 from wfluid.cli.exits import Exit
+from wfluid.cli.folds import Folds
 from wfluid.cli.report import Report
+from wfluid.cli.smoothness import Smoothness
 from wfluid.keyframes.match import REACHED, STOPPED, Match
 
 STREAMED = 0.5
@@ -30,12 +32,18 @@ def judge_match(match: Match, side: float, timed: bool, verbose: bool = False) -
     return Exit.INTERRUPTED if match.status == STOPPED else Exit.FAILED
 
 
-def judge_folds(least: float) -> Exit:
-    """Print whether a map folds: its smallest det J, `least`, is 0 or less."""
-    if least > 0:
+def judge_folds(folds: Folds, least: float, allowed: bool, remedy: str) -> Exit:
+    """Print the folds of the frames, or of the flow between them, whose smallest det J is `least`.
+
+    Folds that are allowed are only a warning.
+    """
+    if not folds.frames and least > 0:
         return Exit.DONE
-    remedy = "leave out points whose paths pass close to each other, or use more cells"
-    print(f"wfluid: the picture folds, its smallest det J is {least:.2g}: {remedy}", file=sys.stderr)
+    text = str(folds) if folds.frames else f"the picture folds, its smallest det J is {least:.2g}"
+    if allowed:
+        print(f"wfluid: warning: {text}", file=sys.stderr)
+        return Exit.DONE
+    print(f"wfluid: {text}; try {remedy}; --allow-folds accepts it", file=sys.stderr)
     return Exit.FAILED
 
 
@@ -51,11 +59,17 @@ def ending(
     if report:
         text += f", {report.frames} frame{'s' if report.frames > 1 else ''}"
         seen = report.extremes
-        figures.append(f"moved by at most {seen['displacement_max_px']:.3g} px")
+        figures.append(str(report.smoothness))
         figures.append(f"areas {seen['jacobian_min']:.2f} … {seen['jacobian_max']:.2f} of what they were")
     if match:
         figures.append(f"the farthest point {match.residual * side:.3g} px from its target")
     return f"{text}: {', '.join(figures)}" if figures else text
+
+
+def judge_smoothness(smoothness: Smoothness, remedy: str) -> None:
+    """Print a warning if the picture moves too far or is strained too much."""
+    if complaint := smoothness.complaint():
+        print(f"wfluid: warning: {complaint}; try {remedy}", file=sys.stderr)
 
 
 def judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[[str], None]) -> None:
@@ -64,6 +78,6 @@ def judge_loop(animation: Animation, seam: Seam, report: Report, note: Callable[
     side = max(animation.picture.width, animation.picture.height)
     if animation.loop == "oscillate" and drift * side > STREAMED * longest:
         note(
-            f"the picture drifts by {drift * side:.0f} px over the loop, subtracted from its frames: "
+            f"the picture drifts by {drift * side:.0f} px over a lap, taken off its frames: "
             "a loop of one period, more viscosity or a smaller force drifts less"
         )

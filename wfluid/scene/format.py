@@ -245,6 +245,12 @@ class FramesTable(SceneTable):
         otherwise="black",
         flag="--background",
     )
+    allow_folds: bool = key(
+        "accept frames in which the picture folds; without it the exit code is then 1",
+        flag(),
+        default=False,
+        flag="--allow-folds",
+    )
 
 
 class GroupTable(SceneTable):

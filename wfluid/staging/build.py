@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from wfluid.animation.animation import Animation
-from wfluid.animation.loops import check_loop
+from wfluid.animation.loops import acting_time, check_loop
 from wfluid.domain.envelopes import product
 from wfluid.domain.grid import Grid
 from wfluid.domain.limits import INK, KEYFRAME_STEPS, MORPH_VISCOSITY, VISCOSITY
@@ -29,6 +29,7 @@ from wfluid.scene.keyframes import KeyframesTable, MorphTable
 from wfluid.scene.scene import Scene
 from wfluid.scene.schema import SchemaError, blame
 from wfluid.staging.aims import Aims, aims_of, moves_of
+from wfluid.staging.arrows import longest_arrow
 from wfluid.staging.drawing import Drawing
 from wfluid.staging.images import SceneImages, frame_size, read_noted
 from wfluid.staging.morphs import pair_of, place_in_second, settings_of
@@ -54,6 +55,8 @@ class Staged:
 
     animation: Animation
     """The animation; of a morph the flow."""
+    arrow: float | None
+    """The longest arrow that is drawn [longer side]; None if not everything that moves has one."""
 
 
 @dataclass(frozen=True)
@@ -86,14 +89,14 @@ def stage_all(
     try:
         builder = _Builder(scene, note)
         if scene.keyframes is None:
-            return Staged(builder.animation(device))
+            return Staged(builder.animation(device), builder.arrow())
         if scene.morph is None:
             aims = builder.aims(scene.keyframes, partial(builder.drawing.place, "to"))
-            return StagedKeyframes(builder.animation(device), aims)
+            return StagedKeyframes(builder.animation(device), builder.arrow(aims), aims)
         pair, settings = builder.morph(scene.morph)
         second = partial(place_in_second, morph=scene.morph, pair=pair, drawing=builder.drawing)
         aims = builder.aims(scene.keyframes, second)
-        return StagedMorph(builder.animation(device), aims, pair, settings)
+        return StagedMorph(builder.animation(device), builder.arrow(aims), aims, pair, settings)
     except SchemaError as error:
         raise scene.error(error) from error
 
@@ -126,6 +129,10 @@ class _Builder:
                 self.timeline = replace(self.timeline, substeps=substeps)
             return aims_of(self.scene, keyframes, moves, self.drawing, self.timeline, destination, self.note)
 
+    def arrow(self, aims: Aims | None = None) -> float | None:
+        """The longest arrow [longer side]."""
+        return longest_arrow(self.scene, self.drawing.side, aims)
+
     def animation(self, device: str | None) -> Animation:
         """The animation."""
         scene = self.scene
@@ -151,13 +158,15 @@ class _Builder:
                 points=points,
                 loop=scene.time.loop,
                 units_checked=True,
+                balanced=not (scene.keyframes or self._creeping) and scene.fluid.scheme != "paper",
             )
 
     def _drawing(self) -> Drawing:
         """The frame, times, envelopes and masks that the scene's forces refer to."""
         scene = self.scene
         width, height = frame_size(scene.picture.size, "picture", self.picture)
-        plain = Drawing(width, height, self.timeline.duration, scene.fluid.scheme, scene.time.loop)
+        acting = acting_time(scene.time.loop, self.timeline)
+        plain = Drawing(width, height, acting, scene.fluid.scheme, scene.time.loop)
         envelopes, weight, frozen = {}, None, None
         for name, table in scene.envelopes.items():
             with blame("envelopes", name):

@@ -70,7 +70,7 @@ class Drawing:
     height: float
     """Height of the frame [px]."""
     duration: float
-    """Length of the animation [s]."""
+    """Length of the animation, of a pingpong that of the way out [s]."""
     scheme: str = "standard"
     """Numerical scheme of the fluid; in "paper" oscillators start as a sine."""
     loop: str | None = None
@@ -218,7 +218,7 @@ class Drawing:
         if grow.period is None:
             rate = area / envelope.integral(0.0, self.duration)
         else:  # a cosine as the rate makes a sine of the growth
-            start, end = time_window("grow", grow, self.duration)
+            start, end = time_window("grow", grow, self.duration, self.loop)
             wave = Oscillator(period=grow.period, phase=grow.phase, start=start, end=end, centred=False)
             rate, envelope = area * 2 * math.pi / grow.period, wave * _fade(grow, start, end)
         envelope = self.modulated("grow", envelope, grow)
@@ -243,7 +243,7 @@ class Drawing:
                 raise ValueError(f"stroke: its path begins at {path.times[0]:g} s, after the animation")
         elif stroke.points is not None and stroke.path is None:
             points = [self.place("stroke", at) for at in stroke.points]
-            path = Path.along(points, *time_window("stroke", stroke, self.duration))
+            path = Path.along(points, *time_window("stroke", stroke, self.duration, self.loop))
         else:
             raise ValueError("stroke: expected either points or path")
         envelope = product(1.0, Constant(), *self.named("stroke", stroke.envelope))

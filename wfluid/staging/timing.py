@@ -27,9 +27,9 @@ def envelope_and_scale(
     _check(what, timing)
     if isinstance(timing, Impulse) and timing.at is not None:
         if timing.at >= duration:
-            raise ValueError(f"{what} at={timing.at:g}: the animation lasts {duration:g} s")
+            raise ValueError(f"{what} at={timing.at:g}: {_lasts(duration, loop)}")
         return Instantaneous(timing.at), 1.0 / (duration - timing.at)
-    start, end = time_window(what, timing, duration)
+    start, end = time_window(what, timing, duration, loop)
     envelope, per_length = _steady(timing, start, end, scheme, loop)
     if isinstance(timing, Ramps) and (timing.rise or timing.fall):
         try:
@@ -39,7 +39,7 @@ def envelope_and_scale(
     return envelope, per_length
 
 
-def time_window(what: str, window: Window, duration: float) -> tuple[float, float]:
+def time_window(what: str, window: Window, duration: float, loop: str | None = None) -> tuple[float, float]:
     """Start and end of a force [s].
 
     Raises:
@@ -47,7 +47,7 @@ def time_window(what: str, window: Window, duration: float) -> tuple[float, floa
     """
     start, end = window.start, duration if window.end is None else window.end
     if start >= duration:
-        raise ValueError(f"{what} start={start:g}: the animation lasts {duration:g} s")
+        raise ValueError(f"{what} start={start:g}: {_lasts(duration, loop)}")
     if window.end is not None and end <= start:
         raise ValueError(f"{what}: end {end:g} is not after start {start:g}")
     if end - start < LEAST_TIME:
@@ -55,6 +55,11 @@ def time_window(what: str, window: Window, duration: float) -> tuple[float, floa
             f"{what} from {start:g} to {end:g} s: expected {LEAST_TIME} s or more; for an impulse give at="
         )
     return start, end
+
+
+def _lasts(duration: float, loop: str | None) -> str:
+    what = "the way out of the pingpong" if loop == "pingpong" else "the animation"
+    return f"{what} lasts {duration:g} s"
 
 
 def phase_of(wave: Wave, loop: str | None) -> float:

@@ -108,6 +108,15 @@ class Solver:
             ghosts.fill(f)
         fill(0.0, state.q)
 
+    def add_velocity(self, state: State, u: np.ndarray, v: np.ndarray) -> None:
+        """Add to the face velocities of `state`: u (ny, nx + 1), v (ny + 1, nx) [longer side/s]."""
+        self._check(state)
+        for values, old, f, ghosts in zip(
+            (u, v), state.velocity, (state.u, state.v), self._step.velocity_ghosts, strict=True
+        ):
+            from_numpy(old + values, f, self.layout)
+            ghosts.fill(f)
+
     def set_map(self, state: State, displacement: np.ndarray) -> None:
         """Set the map of `state` from its displacement (ny, nx, 2) [longer side]."""
         self._check(state)
@@ -193,6 +202,11 @@ class Solver:
         forcing.set((), self.fluid, 0.0, dt, dt)
         foot = self._step.trace(state_in, forcing)
         self._step.carry_map(state_in, foot, state_out)
+
+    def compose(self, outer: State, inner: State, out: State) -> None:
+        """Only compose maps: `out` has at each place the source that `outer` has at the source of `inner`."""
+        self._check(outer, inner, out)
+        self._step.carry_map(outer, (inner.d_x, inner.d_y), out)
 
     def diffuse(self, state_in: State, state_out: State, dt: float, *, t: float = 0.0) -> None:
         """Only diffuse the velocity for dt, from time t on. The map of `state_out` does not change."""
