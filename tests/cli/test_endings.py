@@ -38,7 +38,7 @@ def ended(*arguments, code=0):
 
 def figures(line):
     """What moved [px], and the range of areas."""
-    found = re.search(r"moved by at most ([\d.e-]+) px, areas ([\d.]+) … ([\d.]+) of what they were", line)
+    found = re.search(r"moved by at most ([\d.e-]+) px.*, areas ([\d.]+) … ([\d.]+) of what they were", line)
     return [float(number) for number in found.groups()]
 
 

@@ -55,11 +55,10 @@ class Smoothness:
 
     def __str__(self) -> str:
         """In words."""
-        arrow = "" if self.arrow is None else f", the longest arrow is {self.arrow * self.side:.3g} px"
+        arrow = "" if self.arrow is None else f", the longest arrow has {self.arrow * self.side:.3g} px"
         return (
-            f"longest displacement {self.longest * self.side:.3g} px{arrow}; "
-            f"99 % of the picture is stretched by a factor of at most {math.exp(self.log_strain):.3g} "
-            f"(log-strain {self.log_strain:.2f})"
+            f"moved by at most {self.longest * self.side:.3g} px{arrow}, "
+            f"stretched by a factor of at most {math.exp(self.log_strain):.3g} in 99 % of the picture"
         )
 
     def complaint(self) -> str:
