@@ -149,7 +149,7 @@ def test_a_weight_scales_a_force_where_it_is_painted(make_solver):
     solver = make_solver(GRID.nx, GRID.ny, grid=GRID)
     rest, state = solver.rest(), solver.rest()
     solver._forcing_for([left]).set([left], solver.fluid, 0.0, 0.1, 0.1)
-    solver._forcing_for([left]).push(rest, (state.u, state.v))
+    solver._forcing_for([left]).push((rest.u, rest.v), rest.rho, (state.u, state.v))
     v = state.velocity[1]
     assert np.abs(v[:, 12:]).max() == 0 and np.abs(v[:, :12]).max() > 0.01
 
