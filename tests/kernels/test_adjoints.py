@@ -488,7 +488,7 @@ def test_the_lift_of_a_density_is_transposed(device, walls):
         own.fold(bar)
     ask(out, y)
     with taped(state.arrays) as tape:
-        impulses.push(state, out)
+        impulses.push((state.u, state.v), state.rho, out)
     tape.backward()
     assert_transposed(y, out, bars(rho), rho)
     found = one_step(impulses.gradients, impulses)
@@ -515,7 +515,7 @@ def test_pushes_twirls_and_winds_are_transposed_with_respect_to_their_strengths(
         own.fold(bar)
     ask(out, y)
     with taped(state.arrays) as tape:
-        impulses.push(state, out)
+        impulses.push((state.u, state.v), state.rho, out)
     tape.backward()
     found = one_step(impulses.gradients, impulses)
     right = 0.0

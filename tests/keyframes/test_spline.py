@@ -79,7 +79,10 @@ def creeping(case, **more):
     return Case(**{**settings, "duration": 1.0, "height": case.height, "fluid": fluid, **more})
 
 
-@pytest.mark.parametrize("name", ["one arrow", "a swap", "pins around", "no-slip", "periodic", "not square"])
+LONGER = [pytest.param(name, marks=pytest.mark.long) for name in ("a swap", "pins around", "no-slip")]
+
+
+@pytest.mark.parametrize("name", ["one arrow", "periodic", "not square", *LONGER])
 def test_points_arrive_and_nothing_folds(device, name):
     match = creeping(CASES[name], cells=96).match(device.alias)
     assert match.status == "reached" and match.jacobian[0] > 0.9

@@ -67,7 +67,7 @@ class Probe:
     def __init__(self, solver: Solver, timeline: Timeline, radii: Sequence[float], points: np.ndarray):
         """`radii` are the radii of the forces at every point [longer side]."""
         self.solver, self.timeline, self.radii = solver, timeline, radii
-        self._now, self._next = solver.rest(points), solver.rest(points)
+        self._rest, self._now, self._next = (solver.rest(points) for _ in range(3))
         grid = solver.grid
         self._u = (np.arange(grid.nx + 1) * grid.hx, (np.arange(grid.ny) + 0.5) * grid.hy)
         self._v = ((np.arange(grid.nx) + 0.5) * grid.hx, np.arange(grid.ny + 1) * grid.hy)
@@ -96,11 +96,15 @@ class Probe:
                     column += 1
         return Responses(moved, self._cost(flows, shapes))
 
+    def begin(self) -> None:
+        """Go back to rest."""
+        self._rest.copy_into(self._now)
+
     def advance(self, forces: Sequence[Force], steps: range) -> None:
         """Take the steps under the forces that were found."""
         for step in steps:
             self._step(self._now, self._next, forces, step)
-            self._now, self._next = self._next, self._now
+            self._next.copy_into(self._now)  # not exchanged: a graph is captured for each pair of states
 
     def _window(self, step: int) -> Constant:
         return Constant(self.timeline.time_of(step), self.timeline.time_of(step + 1))

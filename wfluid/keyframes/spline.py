@@ -27,6 +27,7 @@ from wfluid.keyframes.search import SPLINE, Progress, SearchLog, Stopped
 from wfluid.keyframes.ways import plan_ways, radii_of, spacings, window_edges
 from wfluid.model.force import Force, flatten
 from wfluid.model.gaussian_forces import GaussianForce
+from wfluid.step.march import march, steps_of
 from wfluid.step.solver import Solver
 from wfluid.view.coordinate_map import CoordinateMap
 
@@ -108,22 +109,30 @@ class Spline:
             Stopped: the caller's `progress` stopped the search.
         """
         best: tuple[float, tuple[GaussianForce, ...]] = (math.inf, ())
+        states = [self.animation.solver.rest(self._points) for _ in range(4)]
+        probe = self._probe()
         for _ in range(1 + AIMED):
-            missed, longest = self._aim(*self._steer())
+            missed, longest = self._aim(*self._steer(probe, states))
             if missed < best[0]:
                 best = missed, self.found
             if longest <= self.tolerance:
                 break
         self.found = best[1] or self.found
 
-    def _steer(self) -> tuple[Mapping[int, CoordinateMap], Mapping[int, np.ndarray]]:
-        """Find the forces of all windows; returns the maps and the points at keyframes, by step."""
-        solver = self.animation.solver
-        states = [solver.rest(self._points) for _ in range(3)]
-        probe, keyed, maps, places = self._probe(), set(self._keyed_steps()), {}, {}
+    def _steer(
+        self, probe: Probe, states: Sequence[State]
+    ) -> tuple[Mapping[int, CoordinateMap], Mapping[int, np.ndarray]]:
+        """Find the forces of all windows; returns the maps and the points at keyframes, by step.
+
+        The first of `states` is at rest and stays so; the others are worked in.
+        """
+        rest, *states = states
+        rest.copy_into(states[0])
+        probe.begin()
+        keyed, maps, places = set(self._keyed_steps()), {}, {}
         self.found = ()
         for first, last in pairwise(self._edges):
-            forces, states = self._window(probe, states, first, last)
+            forces = self._window(probe, states, first, last)
             self.found += forces
             probe.advance((*self.given, *forces), range(first, last))
             if last in keyed:
@@ -142,9 +151,9 @@ class Spline:
         return Probe(solver, animation.timeline, self.radii, self._points)
 
     def _window(
-        self, probe: Probe, states: list[State], first: int, last: int
-    ) -> tuple[tuple[GaussianForce, ...], list[State]]:
-        """The forces from step `first` to `last`; the states, beginning with the one after them."""
+        self, probe: Probe, states: Sequence[State], first: int, last: int
+    ) -> tuple[GaussianForce, ...]:
+        """The forces from step `first` to `last`; takes the first of `states` there."""
         now, *spare = states
         places, end = now.points, self.animation.timeline.time_of(last)
         aims = np.array([way.at(end) for way in self.ways]) + self._corrections.get(last, 0.0)
@@ -177,20 +186,21 @@ class Spline:
             before = vectors, misfit.ravel()
             vectors = vectors - responses.gentlest(moved, misfit.ravel(), weights)
         forces = self._forces(centers, best[1], first, last)
-        after = self._taken(now, spare, forces, first, last)
-        return forces, [after, *(state for state in states if state is not after)]
+        self._taken(now, spare, forces, first, last).copy_into(now)
+        return forces
 
     def _taken(
         self, now: State, spare: Sequence[State], forces: Sequence[Force], first: int, last: int
     ) -> State:
-        """The state after the steps of a window, one of `spare`; `now` stays."""
-        solver, timeline = self.animation.solver, self.animation.timeline
-        state = now
-        for n, step in enumerate(range(first, last)):
-            t, until, after = timeline.time_of(step), timeline.time_of(step + 1), spare[n % 2]
-            solver.step(state, after, (*self.given, *forces), t, timeline.dt, until=until)
-            state = after
-        return state
+        """The state after the steps of a window, one of the two `spare`; `now` stays.
+
+        Steps are taken between the two only: a graph is captured for each pair of states.
+        """
+        begin, other = spare
+        now.copy_into(begin)
+        advance = steps_of(self.animation.solver, self.animation.timeline, (*self.given, *forces))
+        *_, (end, _) = march(begin, other, range(first, last), advance)
+        return end
 
     def _forces(
         self, centers: np.ndarray, vectors: np.ndarray, first: int, last: int
