@@ -111,6 +111,23 @@ def test_what_lies_in_a_corner_does_not_spoil_the_others(device):
     assert "corner" in corner.reason and other.residual * SIDE < 0.25
 
 
+def test_a_point_that_nothing_moves_is_left_with_its_reason(device):
+    (corner,) = Case(arrows=[((0.0, 0.0), (0.2, 0.2))], fluid={"inertia": False}).match(device.alias).arrivals
+    assert "corner" in corner.reason and corner.particle == (0.0, 0.0)
+
+
+def test_a_stopped_search_keeps_its_best_pass(device):
+    """Eight runs for each of five windows are a pass; stopped in the second, the first one's forces stay."""
+    case, count = creeping(CASES["one arrow"], cells=32), []
+
+    def stop(at):
+        count.append(at.worst)
+        return len(count) > 44
+
+    match = case.match(device.alias, tolerance=1e-9, progress=stop)
+    assert match.status == "stopped" and match.residual * SIDE < 2.0
+
+
 def test_the_gentlest_forces_cost_least():
     """Any other forces that move the points so cost more; the misfits are removed by repetition."""
     rng = np.random.default_rng(3)

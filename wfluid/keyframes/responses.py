@@ -49,6 +49,8 @@ class Responses:
         Where no forces achieve that, for points that nearly touch, `weights` (2 points,) share the misfit.
         """
         rows = self.movable
+        if not rows.any():
+            return np.zeros(moved.shape[1])
         spread = np.linalg.solve(self.cost, moved[rows].T)
         gram = moved[rows] @ spread
         slack = SLACK * np.trace(gram) / len(gram) / weights[rows]

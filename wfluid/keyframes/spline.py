@@ -4,8 +4,8 @@ In a creeping fluid the displacement of points in a short window of time is line
 window, and later windows do not feel them. So the forces are found window by window: of all forces at the
 points that move these by their ways, those of least cost (`responses`), corrected two or three times on the
 full grid. Without the part of the cost that smooths it is the field of least dissipation among all that move
-the points so, the thin-plate spline's counterpart for fluids: it never folds, and walls, stiff and frozen
-parts take part in it.
+the points so, the thin-plate spline's counterpart for fluids. But for errors of the grid it does not fold.
+Walls, stiff and frozen parts take part in it.
 """
 
 from __future__ import annotations
@@ -111,13 +111,15 @@ class Spline:
         best: tuple[float, tuple[GaussianForce, ...]] = (math.inf, ())
         states = [self.animation.solver.rest(self._points) for _ in range(4)]
         probe = self._probe()
-        for _ in range(1 + AIMED):
-            missed, longest = self._aim(*self._steer(probe, states))
-            if missed < best[0]:
-                best = missed, self.found
-            if longest <= self.tolerance:
-                break
-        self.found = best[1] or self.found
+        try:
+            for _ in range(1 + AIMED):
+                missed, longest = self._aim(*self._steer(probe, states))
+                if missed < best[0]:
+                    best = missed, self.found
+                if longest <= self.tolerance:
+                    break
+        finally:  # also where it is stopped within a later pass
+            self.found = best[1] or self.found
 
     def _steer(
         self, probe: Probe, states: Sequence[State]
@@ -161,11 +163,8 @@ class Spline:
         responses = probe.measure(places, centers, first)
         moved, weights = responses.moved * (last - first), self._weights(end)
         best: tuple[float, np.ndarray] = (math.inf, np.zeros(moved.shape[1]))
-        vectors, before = best[1], None
-        if self.given:
-            drifted = self._taken(now, spare, (), first, last).points
-        else:
-            drifted = places
+        drifted = self._taken(now, spare, (), first, last).points if self.given else places
+        before = None
         vectors = responses.gentlest(moved, (aims - drifted).ravel(), weights)
         for n in range(1 + CORRECTIONS):
             forces = self._forces(centers, vectors, first, last)

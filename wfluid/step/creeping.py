@@ -64,8 +64,8 @@ class CreepingStep(Step):
         self._prescribed = field(self.layout, device)
         self._of_impulse = zeros(1, device)
         self._factor = 0.0
-        numbers = Scalars(device, one=1.0, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
-        self._one, self._inverse_h = numbers.one, [numbers.inverse_hx, numbers.inverse_hy]
+        numbers = Scalars(device, inverse_hx=1 / grid.hx, inverse_hy=1 / grid.hy)
+        self._inverse_h = [numbers.inverse_hx, numbers.inverse_hy]
         self._inner = InnerProduct(self.layout, device, 2)
         self.keeps_pressure, self.transports_with_new_velocity = False, True
         self._solves: tuple = ()
